@@ -88,6 +88,7 @@ class World:
         for each in reversed(self.loop):  # the last ones build on those before, and say what the user chose
             each.check(self)
         _ = self.lighting  # refuses an ignition that does not fit the landscape
+        _ = self._igniting  # now: a compiled step cannot make it
 
     @property
     def size(self) -> tuple[int, int]:
