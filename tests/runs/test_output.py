@@ -55,14 +55,14 @@ def test_what_replaces_an_output_leaves_nothing_of_it_and_all_else(tmp_path):
 
 def test_a_failure_leaves_the_folder_as_it_was(tmp_path):
     write(tmp_path / "a", report="first")
-    for name in ("a", "new"):
+    for name in ("a", "new", "of/all/new"):
         with (
             pytest.raises(ZeroDivisionError),
             output_folder(tmp_path / name, "out", overwrite=True, last="report") as draft,
         ):
             (draft / "report").write_text(str(1 / 0))
     assert held(tmp_path / "a") == {"report": "first"}
-    assert not (tmp_path / "new").exists()
+    assert not (tmp_path / "new").exists() and not (tmp_path / "of").exists()
 
 
 def test_an_output_without_its_last_file_is_none(tmp_path):

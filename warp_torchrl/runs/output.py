@@ -24,7 +24,8 @@ def output_folder(
     """Lock an output folder, and yield a draft in it; the block's files are moved into the folder at the end.
 
     The folder is made first, so that a long computation begins only where its result can be written, and a second
-    command is refused at once. If the block fails, the folder is as it was before.
+    command is refused at once. If the block fails, the folder is as it was before, and folders above it that were made
+    for it are gone.
 
     Args:
         folder: The output folder.
@@ -41,7 +42,7 @@ def output_folder(
         RunFolderInUse: If another process writes into it.
         OSError: If it cannot be made or written, with the path.
     """
-    is_new = not folder.exists()
+    made = [each for each in (folder, *folder.parents) if not each.exists()]
     with disk.with_path(folder):
         lock = RunFolderLock(folder)
     try:
@@ -51,8 +52,8 @@ def output_folder(
             yield draft
             _fill(folder, draft, last, replaced)
     except BaseException:
-        if is_new:
-            remove_if_empty(folder)
+        for each in made:
+            remove_if_empty(each)
         raise
     finally:
         lock.release()
