@@ -214,7 +214,7 @@ def _in_state(name: str, show: Map) -> Callable[[Context], Tensor]:
     return shown
 
 
-add_maps(STATE, _in_state)
+add_maps(STATE, _in_state, is_of_agents=False)
 
 
 def clock_and_wind(now: Context) -> Tensor:

@@ -14,6 +14,7 @@ from warp_torchrl.entries import Content, Empty, Part
 from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.mechanics.mechanic import Mechanic
 from warp_torchrl.world.mechanics.table import kinds
+from warp_torchrl.world.state.records import in_sight
 from warp_torchrl.world.state.state import Forecast, WorldState
 from warp_torchrl.world.world import World
 
@@ -117,17 +118,31 @@ class Features(dict[str, Feature]):
         return there + [self[name] for name in choice.features if name in self]
 
 
-def add_maps(table: Features, in_entry: Callable[[str, Map], Callable[..., Tensor]]) -> None:
+def add_maps(
+    table: Features, in_entry: Callable[[str, Map], Callable[..., Tensor]], is_of_agents: bool = True
+) -> None:
     """Add to a table the maps of mechanics (``Mechanic.maps``), which are chosen by name and empty in worlds without.
 
     Args:
         table: Of an entry.
         in_entry: Returns the function of a row, given the name of the mechanic's planes in the state, and the map.
+        is_of_agents: Whether agents are shown the entry: hidden mechanics (``Mechanic.is_hidden``) in sight alone.
     """
     for kind in kinds():
         for name, show in kind.maps.items():
             check_new_name(table.what, name, show, table[name].show if name in table else None)
-            table[name] = _row_of_map(kind, name, in_entry(kind.name, show))
+            shown = _in_sight(show) if is_of_agents and kind.is_hidden else show
+            table[name] = _row_of_map(kind, name, in_entry(kind.name, shown))
+
+
+def _in_sight(show: Map) -> Map:
+    """Return a map of what each agent sees now, 0 elsewhere; all of it where all agents see all."""
+
+    def shown(state: WorldState) -> Tensor:
+        plane, seen = show(state), in_sight(state)
+        return plane if seen is None else plane[:, None] * seen
+
+    return shown
 
 
 def _row_of_map(kind: type[Mechanic], name: str, show: Callable[..., Tensor]) -> Feature:

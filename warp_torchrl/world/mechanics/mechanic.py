@@ -89,6 +89,7 @@ class Mechanic:
         name: Of its planes in the state, and of its values in ``mechanics`` of the configuration.
         turn: Mechanics of a lower one begin and step first; those of the same one do in the order of their names.
         is_knowledge: Whether it is about what agents know alone; worlds that are imagined do without.
+        is_hidden: Whether agents know of its planes in sight alone; worlds that a team imagines begin it again.
         maps: What agents may be shown of it: channels of their view by name, each a function of the worlds that returns
             whole numbers 0..255, uint8 [B, H, W], or [B, A, H, W] where each agent is shown another.
         baselines: Names of heuristics to which a policy is compared in its worlds, beside those of every table.
@@ -97,6 +98,7 @@ class Mechanic:
     name: ClassVar[str] = ""
     turn: ClassVar[int] = 0
     is_knowledge: ClassVar[bool] = False
+    is_hidden: ClassVar[bool] = False
     maps: ClassVar[Mapping[str, Callable[[WorldState], Tensor]]] = {}
     baselines: ClassVar[tuple[str, ...]] = ()
 

@@ -88,6 +88,12 @@ def steps_since(record: Tensor, step: Tensor) -> Tensor:
     return _for_cells(step, record) + 1 - (record >> _STEP)
 
 
+def in_sight(state: WorldState) -> Tensor | None:
+    """Return the cells that each agent sees now, bool [B, A, H, W]; None where all agents see all."""
+    records = records_of(state)
+    return None if records is None else steps_since(records, state.step) == 0
+
+
 def _for_cells(step: Tensor, cells: Tensor) -> Tensor:
     """Return the steps of worlds, [B], in a shape that goes with cells, [B, ...]."""
     return step.view(-1, *[1] * (cells.ndim - 1))

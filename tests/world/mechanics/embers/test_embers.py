@@ -8,6 +8,7 @@ import torch
 from tests.conftest import small_world
 from tests.world.drawing import differing
 from tests.world.mechanics.drawing import begun
+from tests.world.mechanics.there import needs
 from warp_torchrl import make_env
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.system.device import unread
@@ -19,7 +20,8 @@ from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.mechanics.embers.embers import Embers, Fallen, most_cells
-from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.cells import count_trees, is_burning
+from warp_torchrl.world.state.records import in_sight
 
 RIVER = " ".join(["TaTTT~~~TTTTTT"] * 8)
 EAST = (8.0, 0.0)
@@ -160,3 +162,23 @@ def test_what_another_law_reads_is_refused():
         world_of(Embers(firebrands=Firebrands(delay=1.0)))
     with pytest.raises(ValueError, match="chance must be in"):
         Embers(chance=1.5)
+
+
+@needs("sensing", "radio", "belief")
+def test_embers_that_nobody_sees_are_shown_to_nobody_and_stand_in_no_future():
+    overrides = ["mechanics.embers.chance=0.0", "observation.features=[embers]", "belief=ensemble", "landscape.size=16"]
+    env = make_env("search", n_worlds=2, overrides=overrides)
+    env.reset()
+    state, seen = env.world_state, in_sight(env.world_state)
+    everywhere = torch.full_like(state.cells, 255)
+    theirs = state.with_planes(
+        "embers", fallen(state).replace(falls=everywhere, due=fallen(state).due * seen.any(dim=1))
+    )
+    ours, others = (env.world.futures(each, 3) for each in (state, theirs))
+    assert not differing(ours, others)
+    unseen = state.with_planes("embers", fallen(state).replace(falls=everywhere * ~seen.any(dim=1)))
+    shown = [env._scene.observe(each, count_trees(each)) for each in (state, unseen, theirs)]
+    for name in ("view", "picture"):
+        before, same, other = (each.entries[name] for each in shown)
+        assert torch.equal(before, same) and not torch.equal(before, other), name
+    assert not torch.equal(shown[0].state, shown[1].state), "the critic sees all"

@@ -237,9 +237,13 @@ class Ensemble(Belief, Mechanic):
         own = Named({name: picked(leaf) for name, leaf in beliefs.members.held.items()})
         values = None if beliefs.learning is None else picked(beliefs.learning.members[:, 0]).flatten(0, 1)
         worlds, rows = in_parameters(worlds_of(state, own, world.fire), world.fire, values), rows_of(state, count)
+        hidden = [each for each in world.loop if each.is_hidden]
+        others = (NAME, KNOWLEDGE, HEARING, *world.fire.keeps, *(each.name for each in hidden))
         for name, planes in state.extras.held.items():
-            if name not in (NAME, KNOWLEDGE, HEARING, *world.fire.keeps):
+            if name not in others:
                 worlds = worlds.with_planes(name, planes[rows])
+        for each in hidden:
+            worlds = each.begin(worlds, world)
         return worlds
 
     def metric_rows(self, world: Rules) -> tuple[Metric, ...]:

@@ -75,6 +75,7 @@ class Embers(Mechanic):
     deviation: float = 0.7
     sideways: float = 0.2
 
+    is_hidden: ClassVar[bool] = True
     maps: ClassVar = {"embers": lambda state: state.planes("embers", Fallen).falls}
 
     def __post_init__(self) -> None:
