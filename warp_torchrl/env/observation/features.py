@@ -118,9 +118,7 @@ class Features(dict[str, Feature]):
         return there + [self[name] for name in choice.features if name in self]
 
 
-def add_maps(
-    table: Features, in_entry: Callable[[str, Map], Callable[..., Tensor]], is_of_agents: bool = True
-) -> None:
+def add_maps(table: Features, in_entry: Callable[[str, Map], Callable[..., Tensor]], is_of_agents: bool = True) -> None:
     """Add to a table the maps of mechanics (``Mechanic.maps``), which are chosen by name and empty in worlds without.
 
     Args:
