@@ -38,7 +38,9 @@ def test_a_workflow_has_what_each_needs_and_may_only_read(path):
     for job in found["jobs"].values():
         assert {"runs-on", "steps", "timeout-minutes"} <= job.keys()
         assert all(("run" in step) != ("uses" in step) for step in job["steps"])
-        assert all(re.fullmatch(r"[\w-]+/[\w-]+@(release/)?v\d+", step["uses"]) for step in job["steps"] if "uses" in step)
+        assert all(
+            re.fullmatch(r"[\w-]+/[\w-]+@(release/)?v\d+", step["uses"]) for step in job["steps"] if "uses" in step
+        )
 
 
 def test_only_what_publishes_may_write_and_a_person_approves_a_release():

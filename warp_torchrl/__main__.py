@@ -17,6 +17,7 @@ COMMANDS = {
     "score": ("warp_torchrl.commands.score:main", "score a predicted fire against what was seen to burn"),
     "calibrate": ("warp_torchrl.commands.calibrate:main", "score and fit the law of fires to observed ones"),
     "search": ("warp_torchrl.commands.search:main", "search values of a training's keys"),
+    "keys": ("warp_torchrl.commands.usage:main", "tell what keys of worlds, teams and learners mean"),
     "summary": ("warp_torchrl.evaluation.summary:main", "summarise evaluations in one table"),
     "curves": ("warp_torchrl.commands.curves:main", "draw learning curves of runs"),
     "probe": ("warp_torchrl.commands.probe:main", "read a team's messages by linear probes"),

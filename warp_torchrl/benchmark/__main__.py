@@ -202,7 +202,8 @@ _TABLES = {
 
 def _parser() -> argparse.ArgumentParser:
     parser = FlagParser(prog="warp benchmark", description=__doc__)
-    parser.add_argument("what", nargs="*", choices=[[], *_MEASURES, "gpu"], help="env and train by default")
+    told = f"of {', '.join(_MEASURES)} and gpu: env and train by default"
+    parser.add_argument("what", nargs="*", choices=[[], *_MEASURES, "gpu"], metavar="WHAT", help=told)
     parser.add_argument(
         "--scenario",
         nargs="+",

@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from warp_torchrl.commands.program import PLUGINS, run_program
+from warp_torchrl.commands.program import PLUGINS, command_help, run_program
 from warp_torchrl.prediction.calibration.case import FireCase, read_fire_case
 from warp_torchrl.prediction.calibration.fitting import (
     SHARES,
@@ -47,7 +47,7 @@ OUTPUTS = (LAW, "calibration.md")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Score and fit on the command line's fires, and return the exit code."""
-    about = f"{USAGE}\n\n{CalibrationOptions.__doc__}\nfire.KEY as for train.py.\n{PLUGINS}"
+    about = command_help(USAGE, CalibrationOptions, more=(PLUGINS, "fire.KEY: warp keys fire"))
     return run_program(arguments, about, _run)
 
 

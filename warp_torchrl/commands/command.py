@@ -16,9 +16,11 @@ from omegaconf import DictConfig
 
 from warp_torchrl.algorithms import parallel
 from warp_torchrl.commands.checks import CheckFirst
-from warp_torchrl.commands.failure import fail
+from warp_torchrl.commands.failure import DONE, fail
+from warp_torchrl.commands.program import tell
 from warp_torchrl.commands.queue import queued
 from warp_torchrl.commands.sweep import SweepSummary, remove_failure, save_failure, summarise_unfinished
+from warp_torchrl.commands.usage import ASKS, run_help
 from warp_torchrl.evaluation.checks import map_fires, of_worlds, picture_kind, without_checkpoint
 from warp_torchrl.evaluation.evaluate import announce, evaluate_policy
 from warp_torchrl.evaluation.result import Result
@@ -149,6 +151,9 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
         try:
             _check_grammar(arguments)
             load(listed_plugins(arguments))
+            if any(each in ASKS for each in arguments):
+                tell(run_help(name, _overrides(arguments)))
+                sys.exit(DONE)
             if parallel.torchrun_rank():
                 with folder_of_its_own() as quiet:
                     _start_hydra(name, job, [*_without_folder(arguments), *quiet], debug)

@@ -5,7 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from warp_torchrl.commands.correction import Correction, Session
-from warp_torchrl.commands.program import run_program
+from warp_torchrl.commands.program import command_help, run_program
 from warp_torchrl.demonstrations.files import save_recording
 from warp_torchrl.demonstrations.scripted import Person
 from warp_torchrl.demonstrations.summary import Summary, summary
@@ -24,7 +24,7 @@ _TEXTS = ("policy", "out", "by")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Record the corrections that the command line names, and return the exit code."""
-    about = f"{USAGE}\n\n{Session.__doc__}\n{Person.__doc__}"
+    about = command_help(USAGE, Session, Person)
     return run_program(arguments, about, lambda given: _record(*read_session(given)))
 
 

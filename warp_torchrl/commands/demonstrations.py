@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from warp_torchrl.commands.failure import DONE
-from warp_torchrl.commands.program import run_program
+from warp_torchrl.commands.program import command_help, run_program
 from warp_torchrl.demonstrations.export import export_arrays
 from warp_torchrl.demonstrations.files import find_recordings, read_recording
 from warp_torchrl.demonstrations.recording import Recording
@@ -59,7 +59,7 @@ class DemonstrationOptions:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """List, check and export the recordings of the command line, and return the exit code."""
-    return run_program(arguments, f"{USAGE}\n\n{DemonstrationOptions.__doc__}", lambda given: _run(_read(given)))
+    return run_program(arguments, command_help(USAGE, DemonstrationOptions), lambda given: _run(_read(given)))
 
 
 def _read(arguments: Sequence[str]) -> DemonstrationOptions:

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from warp_torchrl.commands.program import run_program
+from warp_torchrl.commands.program import command_help, run_program
 from warp_torchrl.live.match import Setting
 from warp_torchrl.runs.config.construction import ConfigError, construct
 from warp_torchrl.runs.config.grammar import own_values
@@ -23,7 +23,7 @@ _TEXTS = ("policy", "beside", "host", "token", _RECORDINGS)
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Serve the page of the command line until it is interrupted, and return the exit code."""
-    about = f"{USAGE}\n\n{Setting.__doc__}\nOther keys are those of train.py, such as team.n_agents."
+    about = command_help(USAGE, Setting, more=("Other keys are those of warp train, such as team.n_agents.",))
     return run_program(arguments, about, _serve)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import torch
 from tqdm import tqdm
 
-from warp_torchrl.commands.program import PLUGINS, run_program
+from warp_torchrl.commands.program import PLUGINS, command_help, run_program
 from warp_torchrl.prediction.animation import write_animation
 from warp_torchrl.prediction.case import Case, read_case, whole_map
 from warp_torchrl.prediction.files import (
@@ -63,12 +63,13 @@ OUTPUTS = (
     *(ARRIVALS, "perimeters.geojson", MAPS_FIGURE, "fire.gif", "report.md", FIGURE, SCORES),
 )
 """What an earlier prediction may have left, beside its report."""
+_OTHERS = "landscape.KEY and fire.KEY: warp keys landscape fire"
 USAGE = "warp predict landscape.path=FOLDER weather=FILE.csv ignition=FILE [hours=24] [fires=1000] [KEY=VALUE ...]"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Predict the fires of the command line, and return the exit code."""
-    about = f"{USAGE}\n\n{PredictionOptions.__doc__}\nlandscape.KEY and fire.KEY as for train.py.\n{PLUGINS}"
+    about = command_help(USAGE, PredictionOptions, more=(PLUGINS, _OTHERS))
     return run_program(arguments, about, _run)
 
 

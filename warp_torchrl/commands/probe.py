@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from warp_torchrl.commands.program import run_program
+from warp_torchrl.commands.program import command_help, run_program
 from warp_torchrl.evaluation.probe import Reading, probe
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.construction import ConfigError, construct
@@ -39,7 +39,7 @@ class Probe:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the linear probes of the policy that the command line names; return the exit code."""
-    return run_program(arguments, f"{USAGE}\n\n{Probe.__doc__}", lambda given: _probe(read_probe(given)))
+    return run_program(arguments, command_help(USAGE, Probe), lambda given: _probe(read_probe(given)))
 
 
 def read_probe(arguments: Sequence[str]) -> Probe:

@@ -1,16 +1,38 @@
 """Entry and exit of the commands beside train and evaluate."""
 
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from warp_torchrl.commands.failure import DONE, fail
 from warp_torchrl.runs.config.grammar import listed_plugins
+from warp_torchrl.runs.config.key_help import key_help
 from warp_torchrl.runs.config.plugins import load
 from warp_torchrl.system.signals import exit_on_signal
 
-PLUGINS = "plugins: Modules of your own, in this folder or installed, plugins=[my_lab]."
-"""A line of ``--help``."""
+PLUGINS = "  plugins=[]\n      Modules of your own, in this folder or installed, plugins=[my_lab]."
+"""Lines of ``--help``."""
+
+
+def command_help(usage: str, *kinds: type, prefix: str = "", more: Sequence[str] = ()) -> str:
+    """Return what ``--help`` of a command prints.
+
+    Args:
+        usage: How it is called.
+        kinds: The dataclasses of its own keys; ``overrides`` holds keys of others.
+        prefix: What stands before their names.
+        more: Further lines.
+    """
+    return "\n".join((f"usage: {usage}", "", *(key_help(kind, prefix, ("overrides",)) for kind in kinds), *more))
+
+
+def tell(text: str) -> None:
+    """Print a text; one whose reader has left, as ``head`` does, is no error."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python writes the rest as it ends
 
 
 def run_program(arguments: Sequence[str] | None, about: str, do: Callable[[list[str]], int | None]) -> int:
@@ -23,7 +45,7 @@ def run_program(arguments: Sequence[str] | None, about: str, do: Callable[[list[
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     if any(each in ("-h", "--help") for each in given):
-        print(about)
+        tell(about)
         return DONE
     try:
         with exit_on_signal():

@@ -11,7 +11,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from warp_torchrl.commands.program import run_program
+from warp_torchrl.commands.program import command_help, run_program
 from warp_torchrl.prediction.calibration.case import Placed
 from warp_torchrl.prediction.calibration.ground import read_fuel
 from warp_torchrl.prediction.scores.card import write_card
@@ -47,7 +47,7 @@ _LONGEST = 1e7  # minutes: what is later is at the end of all times
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Score the prediction of the command line, and return the exit code."""
-    return run_program(arguments, f"{USAGE}\n\n{ScoreOptions.__doc__}", _run)
+    return run_program(arguments, command_help(USAGE, ScoreOptions), _run)
 
 
 def read_options(arguments: Sequence[str]) -> ScoreOptions:

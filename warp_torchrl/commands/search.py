@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import torch
 
 from warp_torchrl.commands.failure import DONE
-from warp_torchrl.commands.program import run_program
+from warp_torchrl.commands.program import command_help, run_program
 from warp_torchrl.runs.checkpoint import holds_any
 from warp_torchrl.runs.config.compose import GROUPS, compose_config, conf_folder, plain, without_targets
 from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError, UnknownKeyError, construct
@@ -51,7 +51,8 @@ _MAY_CHANGE = ("trials", "jobs", "out")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the search of the command line, and return the exit code."""
-    about = f"{USAGE}\n\n{SearchOptions.__doc__}\nEvery other KEY as for train.py; several values are searched."
+    others = "Every other KEY as for warp train; several values are searched."
+    about = command_help(USAGE, SearchOptions, prefix="search.", more=(others,))
     return run_program(arguments, about, _run_to_its_end)
 
 

@@ -91,7 +91,7 @@ def test_what_are_no_world_steps_is_told(run, capsys, given):
     with pytest.raises(SystemExit):
         main([str(run), f"--at={given}"])
     line = capsys.readouterr().err.splitlines()[-1]
-    assert line.endswith(f"argument --at: must be world steps, whole numbers from 1 on, got {given}")
+    assert line.endswith(f"at: must be world steps, whole numbers from 1 on, got {given}")
 
 
 def test_a_run_that_cannot_say_is_told_before_anything_is_drawn(run, tmp_path, capsys):

@@ -1,6 +1,6 @@
 """Mechanics: what a scenario adds to fire and team. Each is a folder here, a dataclass, and its planes of the state."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal, NamedTuple, Protocol
 
@@ -38,6 +38,11 @@ class Rules(Protocol):
     @property
     def fire(self) -> Automaton:
         """Return the automaton."""
+        ...
+
+    @property
+    def loop(self) -> Sequence["Mechanic"]:
+        """Return its mechanics, in the order in which they act."""
         ...
 
     @property
