@@ -27,8 +27,8 @@ from warp_torchrl.validation import did_you_mean
 
 LEVELS = np.linspace(0.0, 1.0, 101)
 WORDS = (
-    f"In the tables, {' '.join(LEGEND)}; 95 %: bootstrap interval of the number before; to POLICY: difference on the same "
-    "fires; better on: share of these fires. Metrics for --show, among others: "
+    f"In the tables, {' '.join(LEGEND)}; 95 %: bootstrap interval of the number before; to POLICY: difference on the "
+    "same fires; better on: share of these fires. Metrics for --show, among others: "
     + "; ".join(f"{name}: {meaning}" for name, meaning in MEANING.items())
     + "."
 )
