@@ -133,7 +133,7 @@ def most_believed(state: WorldState, threshold: float) -> WorldState:
     """Return the worlds as they are believed to be, batch size [B * G].
 
     A cell burns if it burns in members of more weight than ``threshold``. It is empty if it is empty in members of more
-    than half of the weight. Where the heaviest member agrees, the code is its own. All else of the fire is that member's.
+    than half of the weight. The code is the heaviest member's where it agrees. All else of the fire is its own.
     """
     beliefs = beliefs_of(state)
     codes = cells_of(beliefs)
