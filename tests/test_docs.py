@@ -243,7 +243,8 @@ def extended(tmp_path_factory):
     for folder in ("warp_torchrl", "conf", "tests", "docs/policies"):
         shutil.copytree(ROOT / folder, copy / folder, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "pyproject.toml", copy)
-    files = re.findall(r'```\w+ title="(\S+)"\n(.*?)```', (DOCS / "extending.md").read_text(), flags=re.DOTALL)
+    page = re.sub(r'--8<-- "(\S+)"\n', lambda shown: (DOCS / shown[1]).read_text(), (DOCS / "extending.md").read_text())
+    files = re.findall(r'```\w+ title="(\S+)"\n(.*?)```', page, flags=re.DOTALL)
     for path, text in files:
         assert not (copy / path).exists(), "an extension changes no file that is there"
         (copy / path).parent.mkdir(exist_ok=True)
