@@ -40,7 +40,7 @@ def run(*command: str, folder: Path, **environment: str) -> subprocess.Completed
 
 
 def test_the_example_of_the_fire_alone_runs(capsys):
-    example = blocks("fire_alone.md")[0]
+    example = blocks("prediction.md")[2]
     assert len(example.splitlines()) <= 30
     names: dict = {}
     exec(example, names)
@@ -52,7 +52,7 @@ def test_the_example_of_the_fire_alone_runs(capsys):
 
 def test_the_example_of_a_prediction_runs(capsys):
     names: dict = {}
-    crowns, example = blocks("prediction.md")
+    crowns, example, _ = blocks("prediction.md")
     exec(crowns, names)
     assert capsys.readouterr().out.startswith("[0.0, 1.0, 2.0] ")
     exec(example, names)
@@ -244,7 +244,7 @@ def extended(tmp_path_factory):
         shutil.copytree(ROOT / folder, copy / folder, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "pyproject.toml", copy)
     page = re.sub(r'--8<-- "(\S+)"\n', lambda shown: (DOCS / shown[1]).read_text(), (DOCS / "extending.md").read_text())
-    files = re.findall(r'```\w+ title="(\S+)"\n(.*?)```', page, flags=re.DOTALL)
+    files = re.findall(r'```[^\n]* title="(\S+)"[^\n]*\n(.*?)```', page, flags=re.DOTALL)
     for path, text in files:
         assert not (copy / path).exists(), "an extension changes no file that is there"
         (copy / path).parent.mkdir(exist_ok=True)
