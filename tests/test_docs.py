@@ -206,8 +206,7 @@ def test_the_tutorial_runs_from_its_first_command_to_its_last(tmp_path, monkeypa
     assert (tmp_path / "outputs" / "sweep" / "summary.md").exists() and len(commands) > 7
     monkeypatch.chdir(tmp_path)
     names: dict = {}
-    there = next(block for block in blocks("interop.md") if "load_policy" in block)
-    for block in [*blocks("tutorial.md"), there]:
+    for block in blocks("tutorial.md"):
         exec(block, names)
     first, second = capsys.readouterr().out.splitlines()
     assert re.fullmatch(r"\d+ episodes, \d+% of the trees saved", first)
