@@ -38,7 +38,14 @@ def test_a_workflow_has_what_each_needs_and_may_only_read(path):
     for job in found["jobs"].values():
         assert {"runs-on", "steps", "timeout-minutes"} <= job.keys()
         assert all(("run" in step) != ("uses" in step) for step in job["steps"])
-        assert all(re.fullmatch(r"[\w-]+/[\w-]+@v\d+", step["uses"]) for step in job["steps"] if "uses" in step)
+        assert all(re.fullmatch(r"[\w-]+/[\w-]+@(release/)?v\d+", step["uses"]) for step in job["steps"] if "uses" in step)
+
+
+def test_only_what_publishes_may_write_and_a_person_approves_a_release():
+    jobs = {(path.stem, name): job for path in WORKFLOWS for name, job in workflow(path.stem)["jobs"].items()}
+    assert {name for name, job in jobs.items() if "permissions" in job} == {("release", "publish"), ("docs", "publish")}
+    assert jobs["release", "publish"]["environment"] == "pypi" and jobs["release", "publish"]["needs"] == "build"
+    assert not any("password" in str(job) or "secrets" in str(job) for job in jobs.values())
 
 
 def test_the_workflow_runs_every_step_of_the_script_and_nothing_else():

@@ -32,6 +32,7 @@ def output(capsys, *arguments):
     return capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_prediction_is_measured_as_a_process_of_its_own(capsys):
     pytest.importorskip("rasterio")
     out = json.loads(output(capsys, "predict", "--sides", "60", "--hours", "1", "--json"))

@@ -64,6 +64,7 @@ def test_a_part_that_fails_does_not_take_the_others_along(tmp_path, monkeypatch,
     assert found["training eager"]["agent_steps_per_second"] > 0.0
 
 
+@pytest.mark.slow
 def test_a_way_that_fails_does_not_take_the_others_along(tmp_path, monkeypatch):
     def broken(way, *given):
         raise RuntimeError("no such kernel")

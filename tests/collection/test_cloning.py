@@ -146,6 +146,7 @@ def rows(run):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_a_policy_comes_to_do_what_people_did(several, people, tmp_path):
     training = learning(tmp_path, people, "total_frames=1280", "imitation.until=1.0", "imitation.weight=5")
     before = float(likelihood(training, several).exp().mean())

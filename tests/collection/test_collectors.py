@@ -66,6 +66,7 @@ def check_like(here, elsewhere):
     assert (elsewhere[1]["agents", "action_log_prob"] < 0.0).all()
 
 
+@pytest.mark.slow
 def test_processes_play_the_same_worlds(tmp_path, here):
     check_like(here, first_batches(tmp_path, "collector=process", "seed=1234"))
 

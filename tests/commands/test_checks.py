@@ -25,7 +25,7 @@ def composed(monkeypatch):
 @pytest.mark.parametrize(
     ("command", "mistake", "told"),
     [
-        (train, "n_worlds=0", "n_worlds must be in 1..4096, got 0"),
+        (train, "n_worlds=0", "n_worlds must be in 1..1048576, got 0"),
         (train, "+no_such_key=1", "no_such_key is not a key of the configuration"),
         (train, "+hydra.jobs.name=x", "hydra.jobs is not a key of the configuration: did you mean hydra.job?"),
         (evaluate, "+debug.x=1", "debug must be true or false, got {'x': 1}"),

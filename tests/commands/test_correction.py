@@ -51,6 +51,7 @@ def test_a_person_who_is_never_needed_leaves_the_policy_alone(weak_run):
         assert played.recording.by(Mover.POLICY).all() and not played.recording.corrected().any()
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_recordings(weak_run):
     first, again, other = (corrected(weak_run, seed=seed)[1] for seed in (3, 3, 4))
     for one, two in zip(first, again, strict=True):
@@ -66,6 +67,7 @@ def test_episodes_end_with_the_one_in_which_the_acts_are_reached(weak_run):
     assert len(corrected(weak_run, ALWAYS, acts=acts[0] + 1)[1]) == 2
 
 
+@pytest.mark.slow
 def test_a_recording_ends_with_its_own_episode_whatever_the_others_do(weak_run):
     played = [each.recording.steps for each in corrected(weak_run, ALWAYS, episodes=6, overrides=("horizon=60",))[1]]
     assert len({len(steps) for steps in played}) > 1, "these fires end at different steps"

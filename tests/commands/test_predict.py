@@ -85,6 +85,7 @@ def test_units_that_the_file_does_not_state_are_those_that_the_user_says(folder)
     assert "WindSpeed [wind_speed, km/h]" in (folder / "other" / "report.md").read_text()
 
 
+@pytest.mark.slow
 def test_a_map_of_rothermels_fuels_without_a_canopy_is_warned_of(folder, capsys):
     write(folder / "fuel.tif", np.full(SHAPE, 102), "int16", cell=50.0, crs="EPSG:32631", west=5e5)
     own = {"landscape.table": "fbfm40", "fire.model": "fbfm40", "fires": 1}
@@ -109,6 +110,7 @@ def test_a_window_is_predicted_on_its_own(folder):
     assert read(folder / "out" / "burn_probability.tif")[10, 8] == 1.0
 
 
+@pytest.mark.slow
 def test_an_ignition_may_be_a_raster(folder):
     cells = np.zeros(SHAPE)
     cells[20, 10] = 1

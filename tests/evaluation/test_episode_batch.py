@@ -39,7 +39,7 @@ def test_a_heuristic_plays_as_step_by_step(name, watch, monkeypatch):
     assert all(torch.equal(leaf, leaves[name]) for name, leaf in state.leaves().items())
 
 
-@pytest.mark.parametrize("mode", ["sampled", "deterministic"])
+@pytest.mark.parametrize("mode", ["sampled", pytest.param("deterministic", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("observation", [Surroundings(), Paper()], ids=["surroundings", "paper"])
 @pytest.mark.parametrize("lamed", [False, True], ids=["", "without an agent"])
 def test_a_trained_policy_plays_as_step_by_step(mode, observation, lamed, monkeypatch):
@@ -52,6 +52,7 @@ def test_a_trained_policy_plays_as_step_by_step(mode, observation, lamed, monkey
     assert alike(quick, play(env, policy, 5, mode, watch=True))
 
 
+@pytest.mark.slow
 def test_heuristics_play_side_by_side_as_they_do_alone(make_small_env, monkeypatch):
     env, names = make_small_env(7, small_world(horizon=14)), tuple(HEURISTICS)
     abreast = play_module.play_heuristics(env, 5, names)

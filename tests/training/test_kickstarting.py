@@ -129,6 +129,7 @@ def test_the_learners_own_terms_and_state_stay_as_they_are(tmp_path):
     assert set(taught.state_dict()["loss"]) == set(alone.state_dict()["loss"])
 
 
+@pytest.mark.slow
 def test_a_pupil_comes_to_do_what_its_teacher_does(tmp_path):
     training = student(tmp_path, "total_frames=960", "imitation.until=1.0", "algorithm.epochs=4")
     agreed = []

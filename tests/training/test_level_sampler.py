@@ -22,6 +22,7 @@ def numbers(run, name):
     return [None if row[name] == "" else float(row[name]) for row in rows(run)]
 
 
+@pytest.mark.slow
 def test_rows_tell_the_levels_their_chances_and_how_the_team_did(tmp_path):
     tiny(tmp_path, *CLIMBS, "curriculum.floor=0.25", "curriculum.until=0.8", "total_frames=320").train()
     level, saved = numbers(tmp_path, "curriculum/level"), numbers(tmp_path, "curriculum/saved_0")

@@ -33,6 +33,7 @@ def test_a_trained_teacher_judges_by_what_it_was_trained_to_see(tmp_path):
     assert len(told) > 3
 
 
+@pytest.mark.slow
 def test_what_it_says_is_cloned(tmp_path):
     training = student(tmp_path, "imitation.until=1.0")
     first = float(training.learner.terms(sample_of(training))["loss_bc"].detach())

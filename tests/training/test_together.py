@@ -59,6 +59,7 @@ def told(run):
     return [{key: value for key, value in row.items() if key not in ("time/seconds", "time/fps")} for row in found]
 
 
+@pytest.mark.slow
 def test_a_checkpoint_holds_the_worlds_of_both(whole):
     state = newest(whole)[0].training()
     seeds = [state["collection"]["env"]["seeds"], state["others"][0]["collection"]["env"]["seeds"]]

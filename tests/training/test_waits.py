@@ -25,7 +25,7 @@ def training(folder, *overrides):
     [
         [],
         pytest.param(["algorithm=ippo", "wind=wandering"], marks=pytest.mark.slow),
-        ["scenario=lightning", "reward.normalise=true"],
+        pytest.param(["scenario=lightning", "reward.normalise=true"], marks=pytest.mark.slow),
         pytest.param(
             ["fire=paper", "landscape.relief=200", "observation=paper", "model.symmetry=none"], marks=pytest.mark.slow
         ),

@@ -14,7 +14,7 @@ def scenarios() -> dict[str, str]:
 
 def baselines() -> dict[str, str]:
     """Return what each baseline does, by its name."""
-    return {name: (kind.__doc__ or "").strip().split("\n")[0] for name, kind in HEURISTICS.items()}
+    return {name: _first_paragraph(kind.__doc__ or "") for name, kind in HEURISTICS.items()}
 
 
 def _comment(text: str) -> str:
@@ -22,3 +22,8 @@ def _comment(text: str) -> str:
     lines = [line for line in text.split("\n") if not line.startswith("# @package")]
     end = next((place for place, line in enumerate(lines) if not line.startswith("#")), len(lines))
     return " ".join(line.lstrip("# ") for line in lines[:end])
+
+
+def _first_paragraph(text: str) -> str:
+    """Return the first paragraph of a docstring, in one line."""
+    return " ".join(text.strip().split("\n\n")[0].split())

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 from warp_torchrl.evaluation.play import play_heuristics
 from warp_torchrl.runs.config.run_config import RunConfig
-from warp_torchrl.runs.config.seeds import first_world_seed
 from warp_torchrl.world.world import World
 
 
@@ -20,6 +19,6 @@ def baseline_results(
         count: Number of fires in each world.
         measure: One of an episode's metrics.
     """
-    first = first_world_seed(run_config.seed)
+    first = run_config.first_seed
     envs = [run_config.make_env(count, first, world=world) for world in worlds]
     return [float(play_heuristics(env, first, (name,))[name][measure].mean()) for env in envs]

@@ -18,7 +18,7 @@ from warp_torchrl.models import signature
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.config.saved_config import SavedConfig
-from warp_torchrl.runs.config.seeds import WORLDS, first_world_seed
+from warp_torchrl.runs.config.seeds import WORLDS
 from warp_torchrl.runs.metrics_file import MetricsFile
 from warp_torchrl.runs.policies.trained import MODES
 from warp_torchrl.runs.saving import SaveClock, passes
@@ -173,7 +173,7 @@ class Training(Learning):
         chosen = self.run_config.evaluation.mode
         if chosen != "best":
             return chosen
-        first, kinds = first_world_seed(self.run_config.seed), self.run_config.kinds
+        first, kinds = self.run_config.first_seed, self.run_config.kinds
         reached: dict[str, list[float]] = {mode: [] for mode in MODES}
         for kind in kinds:
             env = self.run_config.make_env(min(self.run_config.evaluation.episodes, WORLDS), first, world=kind.world)

@@ -11,7 +11,6 @@ from warp_torchrl.collection.running import Collection
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.models import joint, signature
 from warp_torchrl.runs.config.run_config import RunConfig
-from warp_torchrl.runs.config.seeds import first_world_seed
 from warp_torchrl.runs.config.worlds import KindOfWorld
 from warp_torchrl.training.reward_scale import RewardScale
 
@@ -36,7 +35,7 @@ class TaskWorlds:
 def task_worlds(run_config: RunConfig) -> list[TaskWorlds]:
     """Return this process's worlds of each kind, with consecutive seeds."""
     worlds = run_config.n_worlds // parallel.size()
-    seed, found = first_world_seed(run_config.seed) + worlds * parallel.rank(), []
+    seed, found = run_config.first_seed + worlds * parallel.rank(), []
     for kind, count in zip(run_config.kinds, run_config.worlds_of_kinds(worlds), strict=True):
         env = run_config.make_training_env(count, seed, kind.world)
         found.append(TaskWorlds(kind=kind, env=env, first_seed=seed, weight=count / worlds))

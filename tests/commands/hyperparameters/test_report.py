@@ -115,6 +115,7 @@ def test_the_best_values_are_an_experiment(overrides, tmp_path):
     assert plain(found) == plain(compose_config("train", overrides))
 
 
+@pytest.mark.slow
 def test_the_figure_has_a_panel_for_each_key(study, tmp_path):
     pytest.importorskip("matplotlib", reason="needs the extra figures")
     import numpy as np

@@ -52,6 +52,7 @@ def test_the_same_seed_learns_the_same():
     assert torch.equal(one.members.values, other.members.values) and one.steps[1].scores == other.steps[1].scores
 
 
+@pytest.mark.slow
 def test_hot_spots_teach_the_rate():
     fire = scene(61, 3)
     arrival = truth(fire, 1.6, 0.0, 3, 100.0)
@@ -81,6 +82,7 @@ def test_lone_hot_spots_apart_from_the_fire_are_false_alarms():
     assert int(burned[:, :20].sum()) == 0
 
 
+@pytest.mark.slow
 def test_a_head_that_is_held_is_not_taken_for_a_slow_fire():
     # A line in the east holds the head after 25 minutes; elsewhere the fire goes on at the rate that it has.
     fire = scene(51, 0)
@@ -94,6 +96,7 @@ def test_a_head_that_is_held_is_not_taken_for_a_slow_fire():
     assert found[-1].posterior["rate"][2] > blind[-1].posterior["rate"][2]
 
 
+@pytest.mark.slow
 def test_a_fire_that_stays_is_forecast_to_stay():
     fire = scene(51, 0)
     arrival = truth(fire, 1.0, 0.0, 0, 25.0)

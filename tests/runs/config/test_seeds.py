@@ -9,8 +9,16 @@ from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.saved_config import SavedConfig
-from warp_torchrl.runs.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED, SEEDS, WORLDS, first_world_seed
+from warp_torchrl.runs.config.seeds import (
+    BEYOND_EVALUATION,
+    FIRST_EVALUATED,
+    MOST_WORLDS,
+    SEEDS,
+    WORLDS,
+    first_world_seed,
+)
 from warp_torchrl.training.loop import Training
+from warp_torchrl.training.tasks import task_worlds
 
 
 def worlds(seed):
@@ -28,6 +36,22 @@ def test_training_and_evaluation_share_no_world():
         assert worlds(seed)[-1] < 2**62, "what an environment takes"
     for before, after in pairwise(tried):
         assert worlds(before)[-1] < worlds(after)[0]
+
+
+def test_trainings_of_many_worlds_share_none_with_another_training():
+    last_of_few = worlds(SEEDS)[-1]
+    for seed in (0, 1, SEEDS):
+        first = first_world_seed(seed, WORLDS + 1)
+        assert first == first_world_seed(seed, MOST_WORLDS) > last_of_few
+        assert first + MOST_WORLDS <= min(first_world_seed(seed + 1, MOST_WORLDS), 2**62)
+    assert first_world_seed(3, WORLDS) == first_world_seed(3)
+
+
+def test_a_training_has_more_worlds_than_a_seed_owns(monkeypatch):
+    monkeypatch.setattr("warp_torchrl.runs.config.seeds.WORLDS", 4)
+    first = first_world_seed(2, 5)
+    (training,) = task_worlds(run_config(plain(compose_config("train", ["seed=2", "n_worlds=5", "landscape.size=8"]))))
+    assert training.env.state_dict()["seeds"].tolist() == list(range(first, first + 5))
 
 
 def test_evaluations_end_before_the_worlds_of_training():

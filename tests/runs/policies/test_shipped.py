@@ -19,6 +19,7 @@ from warp_torchrl.system.shipped import policy_names
 SHIPPED = Path(__file__).parents[3] / "docs" / "policies"
 SCENARIOS = {"default": "default", "generalist": "default", "skirmish": "skirmish", "single": "single"}
 """The scenario in which each is evaluated where nothing else is asked."""
+TO_PLAY = ["skirmish", "single", *(pytest.param(name, marks=pytest.mark.slow) for name in ("default", "generalist"))]
 LAST = {"generalist": "generalist_distilled"}
 """The experiment by which one was trained last, where that is not the one of its name."""
 
@@ -78,7 +79,7 @@ def test_it_is_trained_by_its_experiment(name):
     assert {"reward", "observation", "imitation", "algorithm", "model", "total_frames"} <= set(record.values)
 
 
-@pytest.mark.parametrize("name", [pytest.param("default", marks=pytest.mark.slow), *list(SCENARIOS)[1:]])
+@pytest.mark.parametrize("name", TO_PLAY)
 def test_it_saves_far_more_than_local(name):
     """On 12 fires the difference's standard error is below 6 points; its expectation is 27 and more."""
     policy, found = load_policy(SHIPPED / name), newest(SHIPPED / name)[0]

@@ -130,6 +130,7 @@ def test_fires_that_stop_at_an_area_have_burned_what_they_would_have_by_then():
     assert int((some < NEVER / 2).sum()) < 0.6 * int((every < NEVER / 2).sum())
 
 
+@pytest.mark.slow
 def test_too_many_fires_for_their_window_go_on_in_parts(monkeypatch):
     (fires, cells), key = started(8, weather=3), world_key(torch.arange(3))
     whole = torch.cat(list(arrival_minutes(fires.fire, fires.landscape, cells, key, fires.spells, 30.0)))

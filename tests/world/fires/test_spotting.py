@@ -64,6 +64,7 @@ def test_a_fire_is_the_same_in_any_window_and_batch(monkeypatch: pytest.MonkeyPa
     assert torch.equal(many, arrivals(BRANDS, fires=3, **wide))
 
 
+@pytest.mark.slow
 def test_a_fire_that_has_burned_out_goes_on_where_an_ember_smoulders() -> None:
     ground, lit = across_a_river()
     island = Landscape(ground.cover, ground.age, None).with_layers(fuel=ground.layers.held["fuel"].clone())

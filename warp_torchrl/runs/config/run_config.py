@@ -16,7 +16,7 @@ from warp_torchrl.env import LeveledEnv, WildfireEnv
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.options import CheckpointConfig, EvaluationConfig
 from warp_torchrl.runs.config.plugins import load
-from warp_torchrl.runs.config.seeds import SEEDS, WORLDS
+from warp_torchrl.runs.config.seeds import MOST_WORLDS, SEEDS, first_world_seed
 from warp_torchrl.runs.config.worlds import KindOfWorld, check_alike, check_kinds
 from warp_torchrl.system.compiler import check_compiler
 from warp_torchrl.validation import check_fields
@@ -83,8 +83,8 @@ class RunConfig:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if not 1 <= self.n_worlds <= WORLDS:
-            raise ValueError(f"n_worlds must be in 1..{WORLDS}, got {self.n_worlds}")
+        if not 1 <= self.n_worlds <= MOST_WORLDS:
+            raise ValueError(f"n_worlds must be in 1..{MOST_WORLDS}, got {self.n_worlds}")
         if not 1 <= self.total_frames <= 10**15:
             raise ValueError(f"total_frames must be in 1..1e15, got {self.total_frames}")
         if not 0 <= self.seed <= SEEDS:
@@ -107,6 +107,11 @@ class RunConfig:
         gpus = torch.cuda.device_count()
         if device.type == "cuda" and not parallel.is_torchrun() and count > gpus:
             raise ValueError(f"processes must be at most the {gpus} CUDA devices of this machine, got {count}")
+
+    @property
+    def first_seed(self) -> int:
+        """Return the seed of the training's world 0; world i has that one + i."""
+        return first_world_seed(self.seed, self.n_worlds)
 
     def n_processes(self) -> int:
         """Return how many processes learn together."""
