@@ -1,6 +1,7 @@
 """The command, from files to tables and a card."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -46,6 +47,13 @@ def box(east):
 def scored(folder, *given):
     assert main([*given, f"out={folder / 'out'}", "overwrite=true"]) == 0
     return json.loads((folder / "out" / "scores.json").read_text())
+
+
+def test_a_missing_rasterio_is_told_of_the_key_that_needs_it(fire, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rasterio", None)
+    assert main([f"arrival={fire}/arrivals.tif", f"observed={fire}/seen.geojson", f"out={fire / 'out'}"]) == 2
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last == 'error: arrival must be read with rasterio, which is missing: pip install "warp_torchrl[gis]"'
 
 
 def test_an_ensemble_is_scored_at_each_perimeter(fire, capsys):

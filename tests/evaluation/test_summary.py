@@ -182,6 +182,15 @@ def test_the_figure_shows_means_and_the_share_of_fires_that_reach_each_level(swe
         assert y[apart] == pytest.approx(100.0 * (values >= x).mean(0)[apart])
 
 
+def test_help_explains_the_columns_of_the_table(sweep, capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    told = " ".join(capsys.readouterr().out.split())
+    columns = [each.strip(" |%") for each in summary_table(read_rows(sweep)).splitlines()[0].split(" | ")]
+    assert {"iqm", "success", "better on"} <= {each for each in columns if f"{each}:" in told}
+    assert "95 %: bootstrap" in told and "averted: trees saved beyond those of noop" in told
+
+
 @pytest.mark.skipif(not hasattr(signal, "SIGPIPE"), reason="no pipes that are closed under a writer")
 @pytest.mark.slow
 def test_a_reader_that_has_seen_enough_gets_no_traceback(sweep):

@@ -20,7 +20,7 @@ from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.world import World
 
 _BOUNDS = (0.05, 0.15, 0.25, 0.4, 0.6, 0.75, 0.85, 0.95)
-"""Between two bins; eighths, of eight members that weigh alike, lie within them."""
+"""Bounds of the bins. The chances of eight equal members, eighths, lie inside of bins."""
 POLICY = "dispatch"
 
 
@@ -37,7 +37,7 @@ def believed_chance(state: WorldState, world: World) -> Tensor:
 
 
 def counted(chance: Tensor, burns: Tensor, counts: Tensor) -> Tensor:
-    """Return of the cells that count their number, the sum of their chances and those that burn, float64 [B, 3, bins].
+    """Count cells by bins of chance: their number, the sum of their chances, and those that burn, float64 [B, 3, bins].
 
     Args:
         chance: To burn, as is believed, float32 [B, ...].
@@ -52,7 +52,7 @@ def counted(chance: Tensor, burns: Tensor, counts: Tensor) -> Tensor:
 
 
 def reliability(scenario: str, device: str, episodes: int, overrides: Sequence[str] = ()) -> list[dict[str, Any]]:
-    """Return a row for each bin of chances, of all cells that were not in sight, at every step of ``dispatch``."""
+    """Return a row for each bin of chances. It counts the cells out of sight at every step of ``dispatch``."""
     env = make_env(scenario, n_worlds=1, device=device, overrides=["belief=ensemble", *overrides])
     world = env.world
     seed = torch.arange(FIRST_SEED, FIRST_SEED + episodes, device=device)

@@ -16,6 +16,7 @@ import numpy as np
 
 from warp_torchrl.env.pictures.drawing import line_style
 from warp_torchrl.evaluation.exports import draw_curves, marl_eval, rliable
+from warp_torchrl.evaluation.report import LEGEND, MEANING
 from warp_torchrl.evaluation.rows import SummaryRow, read_rows
 from warp_torchrl.evaluation.statistics import compare, performance_profile, summarise
 from warp_torchrl.system import disk
@@ -25,6 +26,13 @@ from warp_torchrl.system.signals import exit_on_signal
 from warp_torchrl.validation import did_you_mean
 
 LEVELS = np.linspace(0.0, 1.0, 101)
+WORDS = (
+    f"In the tables, {' '.join(LEGEND)}; 95 %: bootstrap interval of the number before; to POLICY: difference on the "
+    "same fires; better on: share of these fires. Metrics for --show, among others: "
+    + "; ".join(f"{name}: {meaning}" for name, meaning in MEANING.items())
+    + "."
+)
+"""What the words of the tables mean."""
 
 
 def summary_table(entries: Sequence[SummaryRow], against: str | None = None) -> str:
@@ -187,6 +195,7 @@ def _range(bounds: Sequence[float], sign: str = "") -> str:
 def main(arguments: list[str] | None = None) -> None:
     """Print the table of the given runs, and draw the figure if asked to."""
     parser = FlagParser(prog="warp summary", description=__doc__)
+    parser.epilog = WORDS
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="runs, or folders of runs")
     parser.add_argument("--against", metavar="POLICY", help="compare with this policy instead of the best")
     parser.add_argument("--show", nargs="+", metavar="METRIC", help="means of these, of what evaluation.json holds")

@@ -21,7 +21,7 @@ FLIGHT, LANDING = ("embers.along", "embers.across"), "embers.landing"
 _GRAVITY = 9.81  # m/s2
 _HEAT_OF_AIR = 1.1 * 1.0 * 300.0  # density [kg/m3] x heat capacity [kJ/kg/K] x temperature [K] (Sardoy et al. 2008)
 _SLOWEST = 3.0
-"""Wind [m/s] of the distances: below it they shrink with the wind, for those of buoyant plumes have no bound."""
+"""Wind [m/s] under which distances shrink with the wind: the equation of buoyant plumes has no bound there."""
 _SIDEWAYS = 0.92  # standard deviation across the wind over the length of the plume (Himoto and Tanaka 2005)
 _HIGHEST = 117.0  # m, to which firebrands of 3 mm rise (Albini 1979)
 _LEAST = 1e-6
@@ -57,7 +57,7 @@ class Firebrands:
         least_intensity: Fireline intensity from which a fire throws any [kW/m]; as in ELMFIRE's example.
         decay: Distance after which a share of 1/e still glows [m].
         temperature: Of the air, by which fuel ignites [C].
-        delay: Minutes from the landing until the new fire spreads at its full rate, before which it does not spread.
+        delay: Minutes from the landing until the new fire spreads. Then it has its full rate.
         followed: Firebrands of each cell that are followed; each stands for its share of all.
 
     Raises:
@@ -96,8 +96,8 @@ class Firebrands:
     def flown(self, plume: Plume, along: Tensor, across: Tensor) -> Flight:
         """Return the flight of firebrands from uniform draws in [0, 1), float32 [..., M].
 
-        The draws along the wind are stratified: the m-th firebrand has the m-th part of the distances, so that few of
-        them have the right mean.
+        The draws along the wind are stratified: the m-th firebrand has the m-th part of the distances. So a few
+        firebrands have the right mean.
         """
         each = torch.arange(along.shape[-1], device=along.device)
         speed = torch.sqrt(plume.east.square() + plume.north.square())
@@ -115,14 +115,14 @@ class Firebrands:
         )
 
     def ignition(self, moisture: Tensor) -> Tensor:
-        """Return the chance that a firebrand ignites fuel of some moisture [% of dry weight]: see ``ignition_chance``.
+        """Return the chance that a firebrand ignites fuel of some moisture [% of dry weight], see ``ignition_chance``.
 
-        0 where that is so damp that no fire spreads.
+        Very damp fuel has a chance of almost 0.
         """
         return ignition_chance(self.temperature, moisture)
 
     def minutes(self, plume: Plume) -> Tensor:
-        """Return the minutes from the arrival of a fire until those that it starts elsewhere spread."""
+        """Return the minutes between the arrival of a fire and the spread of its spot fires."""
         return 2.0 * flight_minutes(plume.flame_length) + self.delay
 
 
@@ -170,7 +170,7 @@ def ignition_chance(temperature: float, moisture: Tensor) -> Tensor:
 
 
 def flight_minutes(flame_length: Tensor) -> Tensor:
-    """Return how long firebrands rise, which is about how long they fall [minutes] (Albini 1979, D43).
+    """Return how long firebrands rise [minutes] (Albini 1979, D43). They fall for about as long.
 
         t = 2 z / w (1.2 + a / 3 (((b + h / z) / a)^1.5 - 1)),   w = 2.3 sqrt(z), a = 5.963, b = 4.563, h = 117 m
 

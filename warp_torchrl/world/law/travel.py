@@ -5,16 +5,16 @@ A fire that spreads freely grows into an ellipse with its origin at a focus. Fro
     F(v) = a |v| - w . v,    a = 1 / (R (1 - e)),    w = a e n
 
 R is the head's rate, n the unit vector where it goes, e = sqrt(1 - 1 / LB^2) (Richards 1990; LB: length to breadth).
-So T = t + w . x obeys the isotropic eikonal equation |grad T| = a (a Randers metric): an ellipse of any length is a
-circle that the wind carries along. The times follow from a cell's eight neighbours in two ways, and the earlier holds:
+So T = t + w . x obeys the isotropic eikonal equation |grad T| = a (a Randers metric). An ellipse of any length is a
+circle that the wind carries along. The time of a cell follows from its eight neighbours in two ways. The earlier holds:
 
-* ``from_edges``: the fire comes over the edge between two adjacent neighbours, between which T is linear (Tsitsiklis
-  1995; Sethian and Vladimirsky 2003). Right for any front that is straight, and for a start from a neighbour.
-* ``along_ray``: it comes straight from the cell that its neighbours have had it from, at the mean slowness that they
-  met. Right for the narrow tip of a young fire, which is sharper than a cell. A way that is shut bends at a cell beside
-  the obstacle, which is the origin of the fire behind it.
+* ``from_edges``: the fire comes over the edge between two adjacent neighbours. T is linear on the edge (Tsitsiklis
+  1995; Sethian and Vladimirsky 2003). This is right for a straight front, and for a start from a neighbour.
+* ``along_ray``: the fire comes straight from an origin, the cell where its neighbours had it from. It has the mean
+  slowness of the neighbours' ways. This is right for the tip of a young fire, which is narrower than a cell. Behind an
+  obstacle a cell beside the obstacle is the origin.
 
-A narrow head passes between two cells before it has reached either. So times go ahead of the fire: see ``kindling``.
+A narrow head passes between two cells before it reaches either. So times go ahead of the fire: see ``kindling``.
 
 Times are in minutes, lengths in cells. The functions read stacks of the neighbours of any cells, [8, ...], directions
 in the order of ``geometry.DIRECTIONS``.
@@ -35,7 +35,7 @@ NEVER = 1e9
 NOWHERE = -1
 """The origin of a fire that came over an edge, from no one cell."""
 ROUNDING = 2e-4
-"""By how much of a cell's crossing a straight way may seem the longer for rounding."""
+"""Share of a cell's crossing by which rounding may lengthen a straight way."""
 Metric = tuple[Tensor, Tensor, Tensor]
 """a, w_east and w_north of the fire in some cells, float32 of one shape [minutes a cell]."""
 _SOUTH, _EAST = zip(*DIRECTIONS, strict=True)
@@ -98,7 +98,7 @@ def arrival(times: Tensor, origins: Tensor, metric: Metric, at: Places) -> tuple
 
     Args:
         times: When it reaches each neighbour, float32 [8, ...] [minutes]; ``NEVER`` where it does not.
-        origins: Flat index of the cell that each neighbour has had it from, int32 [8, ...], or ``NOWHERE``.
+        origins: Flat index of each neighbour's origin, int32 [8, ...], or ``NOWHERE``.
         metric: Of the cells.
         at: The cells.
 
@@ -118,7 +118,7 @@ def arrival(times: Tensor, origins: Tensor, metric: Metric, at: Places) -> tuple
 
 
 def kindling(times: Tensor, slowness: Tensor) -> Tensor:
-    """Return from when on the neighbours of cells that the fire comes to have times too, float32 [...] [minutes].
+    """Return when the neighbours of cells get times, some minutes before the fire comes, float32 [...] [minutes].
 
     Args:
         times: When it reaches the cells, float32 [...] [minutes].
@@ -148,8 +148,8 @@ def least_ratio(before: Metric, after: Metric) -> Tensor:
 def since(times: Tensor, now: Tensor | float, ratio: Tensor) -> Tensor:
     """Return the times from which cells spread fire in another weather, float32 [...] [minutes].
 
-    A cell has sent the fire as far as F tells of the minutes that it has burned. In each direction that way takes them
-    times F' / F in the other weather, and at least times ``ratio``: so fire comes nowhere before ``now``.
+    A cell has sent the fire a way that took it the minutes since then. In the other weather the same way takes F' / F
+    times as long, and at least ``ratio`` times. So fire comes nowhere before ``now``.
 
     Args:
         times: When the fire reached them, float32 [...] [minutes].
@@ -164,8 +164,8 @@ def until(times: Tensor, now: Tensor | float, around: Tensor, before: Metric, af
 
         t' = now + (t - now) min_d F'_d / (t - t_d) / min_d F_d / (t - t_d)
 
-    The front lies (t - now) / (t - t_d) of the way back to each neighbour d that burns before the cell, and what is
-    left takes that direction's F' in place of its F. Never before ``now``; t in the same weather.
+    Each neighbour d burns before the cell. The front lies (t - now) / (t - t_d) of the way back to it, and the rest of
+    the way takes F' in place of F. The time is never before ``now``, and is t in the same weather.
 
     Args:
         times: When it would have, float32 [...] [minutes], after ``now``.
@@ -205,15 +205,15 @@ def from_edges(times: Tensor, metric: Metric) -> tuple[Tensor, Tensor, Tensor, T
 
 
 def along_ray(times: Tensor, origins: Tensor, origin: Tensor, metric: Metric, at: Places) -> Tensor:
-    """Return when the fire comes straight from an origin that the neighbours on the way have had it from.
+    """Return when the fire comes straight from the origin of the neighbours on the way.
 
-    Their mean slownesses from there, t / F, tell that of the way to the edge between them:
+    Their mean slowness from the origin, t / F, is that of the way to the edge between them:
 
         t = t_o + F(x - o) (m (1 - 1 / n) + 1 / n),   m = (1 - s) (t_a - t_o) / F(a - o) + s (t_b - t_o) / F(b - o)
 
-    n is the distance from the origin in rows or columns, whichever is more, and s n the other. The way passes nearer to
-    one of the neighbours, b where s is over a half. Where that one alone has had the fire from the origin, m is that of
-    it: a cell does not stop a fire that clips less than half of it.
+    n is the larger of the distances from the origin in rows and columns, and s n is the other. The way passes nearer to
+    one of the neighbours, b where s is over a half. Where the origin is that neighbour's alone, m is that of it: a cell
+    does not stop a fire that clips less than half of it.
 
     Args:
         times: See ``arrival``.

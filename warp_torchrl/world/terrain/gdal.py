@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-NO_RASTERIO = 'path must be read with rasterio, which is missing: pip install "warp_torchrl[gis]"'
+NO_RASTERIO = 'must be read with rasterio, which is missing: pip install "warp_torchrl[gis]"'
 _ALONE = {
     "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",  # a mask beside a file may be of any driver, VRT too
     "GDAL_PAM_ENABLED": "NO",
@@ -21,7 +21,7 @@ def reading(rule: str, **options: str) -> Iterator[Any]:
     """Yield rasterio while GDAL and PROJ read only named files.
 
     Args:
-        rule: How the line begins that an error of theirs becomes.
+        rule: How the line begins that an error of theirs becomes: what is read, ``must``, and the rule.
         options: Further options of GDAL.
 
     Raises:
@@ -30,7 +30,7 @@ def reading(rule: str, **options: str) -> Iterator[Any]:
     try:
         import rasterio
     except ImportError:
-        raise ValueError(NO_RASTERIO) from None
+        raise ValueError(f"{rule.partition(' must ')[0]} {NO_RASTERIO}") from None
     from rasterio._err import CPLE_BaseError
     from rasterio.errors import CRSError, RasterioError
 

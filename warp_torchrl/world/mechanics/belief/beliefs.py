@@ -83,13 +83,12 @@ def disagreement(beliefs: Beliefs) -> Tensor:
 def hidden_probability(beliefs: Beliefs, fires: int) -> Tensor:
     """Return the chance of each cell to burn by a fire that nobody saw, float32 [B, G, H, W].
 
-    A fire that is not known is one of the ``possible`` ones, or that which was found.
+        p = (1 - o) ((1 - g)^m - (1 - g - h)^m)
 
-        p = (1 - o) ((1 - g)^m - (1 - g - h)^m), m = fires that were not found
-
-    h is the share that burns in a cell, and g the share that has burned out there, so that of several fires the first
-    to arrive counts. Both are means over the cells within ``BLUR``: fires of one place differ, and M of them leave
-    gaps. o is the share of the members in which the cell has burned out.
+    Of the hidden fires, by how likely they are, the share h burns in a cell, and the share g has burned out there. The
+    first of several fires to arrive counts. h and g are means over the cells within ``BLUR``: fires of one place
+    differ, and M of them leave gaps. m is the number of fires that were lit and not found. o is the share of the
+    members in which the cell has burned out.
 
     Args:
         beliefs: What is believed.
@@ -112,7 +111,7 @@ def _is_ash(cells: Tensor, burned: Tensor) -> Tensor:
 
 
 def _spread(share: Tensor, planes: Tensor) -> Tensor:
-    """Return the means, over the cells near each, of planes bool [B, M, H, W] by shares [B, G, M], [B, G, H, W]."""
+    """Return the sum of planes, bool [B, M, H, W], by shares, [B, G, M], as means over near cells, [B, G, H, W]."""
     total = torch.bmm(share, planes.flatten(2).to(torch.float32)).unflatten(2, planes.shape[2:])
     return sums_about(total, BLUR) / sums_about(torch.ones_like(total[:1, :1]), BLUR)
 
@@ -120,7 +119,7 @@ def _spread(share: Tensor, planes: Tensor) -> Tensor:
 def hidden_fire(beliefs: Beliefs) -> Tensor:
     """Return the square root of the chance of each cell to burn by a fire that nobody saw, float32 [B, G, H, W].
 
-    So small chances can be told apart in whole numbers.
+    The root lets whole numbers tell small chances apart.
     """
     return beliefs.unseen.sqrt()
 
@@ -131,10 +130,10 @@ def burn_soon(beliefs: Beliefs) -> Tensor:
 
 
 def most_believed(state: WorldState, threshold: float) -> WorldState:
-    """Return the worlds as they are believed to be, batch size [B * G]: what the members say of each cell.
+    """Return the worlds as they are believed to be, batch size [B * G].
 
-    A cell burns if those that say so weigh more than ``threshold``, and is empty if those that say so weigh more than
-    half; its code is that of the heaviest member, where this says the same. All else of the fire is this member's.
+    A cell burns if it burns in members of more weight than ``threshold``. It is empty if it is empty in members of more
+    than half of the weight. The code is the heaviest member's where it agrees. All else of the fire is its own.
     """
     beliefs = beliefs_of(state)
     codes = cells_of(beliefs)

@@ -1,8 +1,8 @@
 """Embers that fall where the fire has not come to yet, and what they ignite.
 
-Under law ``rate`` a cell throws firebrands as it catches fire: how many follows from the heat that it releases, how far
-they fly from the front's intensity and the wind (``world.behaviour.firebrands``). Under the other laws, which know no
-heat, each burning tree throws one with some chance in a tick.
+Under law ``rate`` a cell throws firebrands as it catches fire (``world.behaviour.firebrands``). Their number follows
+from the heat of the cell, their distance from the front's intensity and the wind. The other laws know no heat: each
+burning tree throws a firebrand with some chance in a tick.
 """
 
 from dataclasses import dataclass, field
