@@ -139,7 +139,7 @@ def test_places_on_real_ground_need_a_folder(capsys):
     assert on_ground("a b") == tuple(
         ScenarioVariant(name, name, ("landscape.path='a b'",)) for name in ("landfire", "wildland")
     )
-    for group, told in (("ground", "got ground, which needs --ground"), ("tems", "got tems: did you mean teams?")):
+    for group, told in (("ground", "got ground, which needs ground"), ("tems", "got tems: did you mean teams?")):
         with pytest.raises(SystemExit, match="2"):
             command.main(["generalist", "--places", group])
         assert told in capsys.readouterr().err

@@ -76,4 +76,4 @@ def test_the_command_writes_what_it_is_given_a_file_for(runs, capsys):
     assert files["curves"].read_bytes()[:4] == b"\x89PNG"
     with pytest.raises(SystemExit):
         main([str(runs / "3"), "--curves", str(runs / "none.png")])
-    assert "--curves: no run has a metrics.csv with the forest saved" in capsys.readouterr().err
+    assert "curves: no run has a metrics.csv with the forest saved" in capsys.readouterr().err

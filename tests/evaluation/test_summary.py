@@ -157,7 +157,7 @@ def test_a_missing_matplotlib_is_told_after_the_table(sweep, capsys, monkeypatch
     with pytest.raises(SystemExit):
         main([str(sweep), "--plot", str(sweep / "figure.png")])
     printed = capsys.readouterr()
-    assert "| mappo |" in printed.out and "--plot needs Matplotlib: pip install" in printed.err
+    assert "| mappo |" in printed.out and "plot needs Matplotlib: pip install" in printed.err
 
 
 def test_the_figure_shows_means_and_the_share_of_fires_that_reach_each_level(sweep, tmp_path, monkeypatch):

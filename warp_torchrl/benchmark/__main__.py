@@ -123,7 +123,7 @@ def _generalist(options: Namespace) -> dict[str, Rows]:
     known = {place.name: (place,) for group in groups.values() for place in group if place.rival is None} | groups
     unknown = [name for name in options.places or () if name not in known]
     if unknown:
-        needs = ", which needs --ground" if unknown[0] == "ground" else did_you_mean(unknown[0], known)
+        needs = ", which needs ground" if unknown[0] == "ground" else did_you_mean(unknown[0], known)
         raise ConfigError(f"places must be of {', '.join(groups)}, or one row of these, got {unknown[0]}{needs}")
     places = [place for name in options.places or groups for place in known[name]]
     rows = []
@@ -247,7 +247,7 @@ def _gpu(parser: argparse.ArgumentParser, options: Namespace) -> None:
     if options.what != ["gpu"]:
         parser.error("gpu is measured alone")
     if options.device is None and not torch.cuda.is_available():
-        parser.exit(2, "error: torch finds no CUDA device here; --device cpu shows in small what gpu measures\n")
+        parser.exit(2, "error: torch finds no CUDA device here; device=cpu shows in small what gpu measures\n")
     device = options.device or "cuda"
     logging.getLogger("torchrl").setLevel(logging.WARNING)
     if not measure_gpu(device, options.file, SMALL if device == "cpu" else Size()):
@@ -260,7 +260,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser = _parser()
     options = parser.parse_args(flag_arguments(arguments))
     if options.plot is not None and find_spec("matplotlib") is None:
-        parser.error("--plot needs matplotlib (extra figures)")
+        parser.error("plot needs matplotlib (extra figures)")
     if "gpu" in options.what:
         _gpu(parser, options)
         return

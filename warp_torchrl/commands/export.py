@@ -3,7 +3,7 @@
 The folder holds a checkpoint without its training state. It can be evaluated, loaded and shipped; no run resumes from
 it.
 
-``--average OTHER`` gives it the mean of the parameters of both. Of a training and of what it started from, that is
+``average=OTHER`` gives it the mean of the parameters of both. Of a training and of what it started from, that is
 often better than either (Wortsman et al. 2022, "Model soups"): docs/results.md.
 """
 

@@ -28,7 +28,7 @@ from warp_torchrl.validation import did_you_mean
 LEVELS = np.linspace(0.0, 1.0, 101)
 WORDS = (
     f"In the tables, {' '.join(LEGEND)}; 95 %: bootstrap interval of the number before; to POLICY: difference on the "
-    "same fires; better on: share of these fires. Metrics for --show, among others: "
+    "same fires; better on: share of these fires. Metrics for show, among others: "
     + "; ".join(f"{name}: {meaning}" for name, meaning in MEANING.items())
     + "."
 )
@@ -218,28 +218,28 @@ def main(arguments: list[str] | None = None) -> None:
         print(metrics_table(entries, options.show) if options.show else summary_table(entries, options.against))
     except ValueError as error:
         parser.error(plain_text(str(error)))
-    for flag, make in (("--marl-eval", marl_eval), ("--rliable", rliable)):
-        path = getattr(options, flag[2:].replace("-", "_"))
+    for key, make in (("marl_eval", marl_eval), ("rliable", rliable)):
+        path = getattr(options, key)
         if path is not None:
-            _or_refuse(parser, flag, partial(_write_json, make, entries, path))
-    for flag, draw in (("--plot", draw_summary), ("--curves", draw_curves)):
-        path = getattr(options, flag[2:])
+            _or_refuse(parser, key, partial(_write_json, make, entries, path))
+    for key, draw in (("plot", draw_summary), ("curves", draw_curves)):
+        path = getattr(options, key)
         if path is not None:
-            _or_refuse(parser, flag, partial(draw, entries, path))
+            _or_refuse(parser, key, partial(draw, entries, path))
 
 
 def _write_json(make: Callable[[Sequence[SummaryRow]], Any], entries: Sequence[SummaryRow], path: Path) -> None:
     disk.replace(path, json.dumps(make(entries)))
 
 
-def _or_refuse(parser: FlagParser, flag: str, write: Callable[[], None]) -> None:
+def _or_refuse(parser: FlagParser, key: str, write: Callable[[], None]) -> None:
     """Write a file, or end with a line where it cannot be written."""
     try:
         write()
     except (OSError, ValueError) as error:  # a format that Matplotlib does not write; runs without curves
-        parser.error(f"{flag}: {plain_text(str(error))}")
+        parser.error(f"{key}: {plain_text(str(error))}")
     except ImportError:
-        parser.error(f'{flag} needs Matplotlib: pip install "warp_torchrl[figures]"')
+        parser.error(f'{key} needs Matplotlib: pip install "warp_torchrl[figures]"')
 
 
 if __name__ == "__main__":
