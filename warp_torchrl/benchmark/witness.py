@@ -3,9 +3,10 @@
 import math
 import random
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
+from torch import Tensor
 
 from warp_torchrl.benchmark.tables import entry, table
 from warp_torchrl.world.behaviour.rate_of_spread import rate_of_spread
@@ -39,8 +40,7 @@ def witness_errors(beds: int, seed: int = 0) -> list[dict[str, Any]]:
     theirs = np.array([crown_witness(bed) for bed in drawn]).T
     surface = np.array([crown_witness({**bed, **_NO_CROWN})[1] for bed in drawn])
     ours, on_surface = of_crowns(columns), of_crowns(columns, layers=("cover", "height"))
-    assert ours.kind is not None  # the beds have crowns
-    kind = (ours.kind.numpy() == theirs[0]).mean()
+    kind = (cast("Tensor", ours.kind).numpy() == theirs[0]).mean()
     kinds = ", ".join(f"{int((theirs[0] == number).sum())} {name}" for number, name in enumerate(_KINDS))
     rows = [
         _row("surface rate", on_surface.head.numpy(), surface),

@@ -11,7 +11,7 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.metrics import metric_rows
 from warp_torchrl.evaluation import cache
 from warp_torchrl.evaluation.goal import goal
-from warp_torchrl.evaluation.maps import play_maps, write_maps
+from warp_torchrl.evaluation.maps import PolicyMaps, play_maps, write_maps
 from warp_torchrl.evaluation.method import method
 from warp_torchrl.evaluation.picture import PICTURE_KINDS, PictureKind, record_episode
 from warp_torchrl.evaluation.play import Episodes, WithoutAgent, baselines_of, play, play_heuristics
@@ -58,16 +58,12 @@ def evaluate_policy(
     beside = baselines_of(run_config.world) if wanted is None else dict.fromkeys(wanted)
     others = _baselines(run_config, env, [each for each in beside if each != name])
     episodes = play(env, actor, first, mode, watch=True)
-    learner, digest, frames, other_modes, left_out = None, "", None, {}, {}
+    learner, digest, frames, other_modes = None, "", None, {}
     if isinstance(found, checkpoints.Checkpoint):
         learner, digest = method(completed(found.saved_config()))
         frames = found.manifest.frames
         other_modes = {f"trained, {other}": play(env, actor, first, other) for other in MODES if other != mode}
-    if run_config.evaluation.leave_one_out:
-        left_out = {
-            agent: play(env, WithoutAgent(actor, index, env.world.team), first, mode)
-            for index, agent in enumerate(env.agent_names)
-        }
+    left_out = _without_each(env, actor, first, mode) if run_config.evaluation.leave_one_out else {}
     if map_fires is not None:
         log.info("playing %d fires on one ground for the maps, without the team and with it", map_fires)
     maps = None if map_fires is None else play_maps(run_config, lambda env: _actor(found, env, actor), mode, map_fires)
@@ -91,20 +87,43 @@ def evaluate_policy(
         folder=folder,
         wrote=() if folder is None else tuple(wrote),
     )
-    if folder is None:
-        return result
+    if folder is not None:
+        _write(result, folder, run_config, maps)
+        _write_picture(folder, picture, one, filmed, f"{run_config.scenario}\n{name}", first, mode)
+    return result
+
+
+def _without_each(env: WildfireEnv, actor: TensorDictModuleBase, first: int, mode: str) -> dict[str, Episodes]:
+    """Return the episodes of the team without each agent, by its name."""
+    agents = enumerate(env.agent_names)
+    return {agent: play(env, WithoutAgent(actor, index, env.world.team), first, mode) for index, agent in agents}
+
+
+def _write(result: Result, folder: Path, run_config: RunConfig, maps: PolicyMaps | None) -> None:
+    """Write ``evaluation.json`` and the maps."""
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "evaluation.json", result.report)
     if maps is not None:
         title = f"{run_config.scenario}: {maps.seeds[1]} fires on one ground, {maps.horizon} steps"
-        write_maps(folder, maps, getattr(run_config.world.landscape, "grid", None), title, name)
-    for kind in PICTURE_KINDS:  # a former evaluation's picture would show another policy
-        (folder / f"episode.{kind}").unlink(missing_ok=True)
-    if picture is not None:
-        path = folder / f"episode.{picture}"
+        write_maps(folder, maps, getattr(run_config.world.landscape, "grid", None), title, result.policy)
+
+
+def _write_picture(
+    folder: Path,
+    kind: PictureKind | None,
+    env: WildfireEnv,
+    policy: TensorDictModuleBase,
+    title: str,
+    seed: int,
+    mode: str,
+) -> None:
+    """Write the first fire as a picture; one that an earlier evaluation left would show another policy."""
+    for each in PICTURE_KINDS:
+        (folder / f"episode.{each}").unlink(missing_ok=True)
+    if kind is not None:
+        path = folder / f"episode.{kind}"
         with disk.with_path(path):
-            record_episode(path, picture, one, filmed, f"{run_config.scenario}\n{name}", first, mode)
-    return result
+            record_episode(path, kind, env, policy, title, seed, mode)
 
 
 def announce(result: Result) -> None:

@@ -3,6 +3,7 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import torch
@@ -44,10 +45,9 @@ class Predicted:
 
     def chance(self, minutes: float, is_last: bool = False) -> Tensor:
         """Return the burn probability by a time, that of the last observation or another, float32 [H, W]."""
-        if self.arrival is None or (is_last and self.probability is not None):
-            assert self.probability is not None  # one of both is given
+        if self.probability is not None and (is_last or self.arrival is None):
             return self.probability
-        return burn_probability(self.arrival, minutes)
+        return burn_probability(cast("Tensor", self.arrival), minutes)
 
     def areas(self, minutes: float) -> Tensor | None:
         """Return the area that each fire burned by a time, float32 [F] [ha]; None where times are not known."""
@@ -82,7 +82,8 @@ def read_predicted(
         if not bool(((chance >= 0.0) & (chance <= 1.0)).all()):
             raise ValueError(f"probability must be in 0..1, {probability} has {float(chance.abs().max()):g}")
         grid = grid or header.grid
-    assert grid is not None  # the options want one of both
+    if grid is None:
+        raise ValueError("arrival or probability must name a file")
     return Predicted(grid=grid, arrival=times, probability=chance)
 
 
