@@ -17,6 +17,7 @@ from warp_torchrl.heuristics.reactive import Greedy, Local, NoOp, Random
 from warp_torchrl.heuristics.ring import Mixed, Ring
 from warp_torchrl.heuristics.rollout import Rollout
 from warp_torchrl.heuristics.searching import Lawnmower, Oldest, Searching
+from warp_torchrl.heuristics.tactics import AnchorAndFlank, FlankAttack, HeadAttack, PointProtection
 from warp_torchrl.heuristics.targeting import Targeted
 from warp_torchrl.validation import check_new_name
 
@@ -35,6 +36,10 @@ HEURISTICS: dict[str, type[Heuristic]] = {
     "targeted": Targeted,
     "clockwise": Clockwise,
     "own_land": OwnLand,
+    "head_attack": HeadAttack,
+    "flank_attack": FlankAttack,
+    "anchor_and_flank": AnchorAndFlank,
+    "point_protection": PointProtection,
     "rollout": Rollout,
 }
 """Heuristic policies by name; ``heuristic`` adds to them."""
@@ -64,11 +69,14 @@ def heuristic(name: str) -> Callable[[type[Heuristic]], type[Heuristic]]:
 __all__ = [
     "HEURISTICS",
     "TEACHERS",
+    "AnchorAndFlank",
     "Clockwise",
     "Coordinated",
     "Dispatch",
+    "FlankAttack",
     "Follower",
     "Greedy",
+    "HeadAttack",
     "Heuristic",
     "Lawnmower",
     "Local",
@@ -76,6 +84,7 @@ __all__ = [
     "NoOp",
     "Oldest",
     "OwnLand",
+    "PointProtection",
     "Random",
     "Ring",
     "Rollout",

@@ -43,6 +43,10 @@ class Dispatch(Coordinated):
         clear = self._clear(state, mask, who)
         return clear if all(clears) else torch.where(who, clear, self._attack(state, mask))
 
+    def worth(self, state: WorldState, value: Tensor, cells: Tensor) -> Tensor:
+        """Return the value of cells, flat indices int64 [B, K], for each agent, float32 [B, 1 or A, K]."""
+        return value.flatten(1).gather(1, cells)[:, None]
+
     def _clears(self) -> list[bool]:
         """Return which agents clear firebreaks."""
         team = self.world.team
@@ -55,7 +59,7 @@ class Dispatch(Coordinated):
         table = world.team.table(mask.device)
         value, front = self.value(state)
         cells, valid = list_cells(front)
-        gain = value.flatten(1).gather(1, cells)[:, None] - path_length(state, self.world, cells)
+        gain = self.worth(state, value, cells) - path_length(state, self.world, cells)
         gain = gain - LAST * ~table.can["extinguish"][:, None]
         gain = gain.masked_fill(~valid[:, None] | (tank == 0)[..., None], -math.inf)
         claims = match_cells(state, cells, gain, spacing=3, discount=6.0, taken=1000.0)
