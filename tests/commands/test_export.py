@@ -14,7 +14,7 @@ from warp_torchrl import load_policy
 from warp_torchrl.commands.export import main
 from warp_torchrl.models import ACTION
 from warp_torchrl.models.trust import Trust
-from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs import export as exports
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
 from warp_torchrl.runs.policies.find import find_policy
 
@@ -30,7 +30,7 @@ def run(tmp_path_factory):
 @pytest.fixture
 def exported(run, tmp_path, capsys):
     main([str(run), str(tmp_path / "policies" / "tiny")])
-    assert "skirmish, 64 frames" in capsys.readouterr().out
+    assert "skirmish, 64 world steps in 1 training" in capsys.readouterr().out
     return tmp_path / "policies" / "tiny"
 
 
@@ -87,7 +87,7 @@ def test_a_disk_that_refuses_leaves_nothing(run, tmp_path, monkeypatch):
     def refuses(*args):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(checkpoints.shutil, "copyfile", refuses)
+    monkeypatch.setattr(exports.shutil, "copyfile", refuses)
     with pytest.raises(SystemExit):
         main([str(run), str(tmp_path / "policy")])
     assert not (tmp_path / "policy").exists()
@@ -152,7 +152,7 @@ def test_numbers_that_are_not_finite_are_not_exported(run, tmp_path, capsys, num
 
 def test_networks_that_are_larger_than_the_machine_are_refused_before_they_are_made(run, tmp_path, capsys):
     shutil.copytree(run, tmp_path / "run")
-    found, _ = checkpoints.newest(tmp_path / "run")
+    found, _ = newest(tmp_path / "run")
     content = json.loads((found.path / "config.json").read_text())
     content["values"]["model"]["actor_hidden"] = [8192] * 60  # 16 GB of parameters
     (found.path / "config.json").write_text(json.dumps(content))

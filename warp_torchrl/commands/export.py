@@ -17,6 +17,8 @@ import torch
 from warp_torchrl.commands.program import flag_arguments, one_line_end
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.saved_config import SavedConfig
+from warp_torchrl.runs.export import export
+from warp_torchrl.runs.history import history_line, mean_of
 from warp_torchrl.runs.policies.find import find_policy
 from warp_torchrl.runs.policies.load import policy_of
 from warp_torchrl.system.finite import not_finite
@@ -48,8 +50,12 @@ def main(arguments: list[str] | None = None) -> None:
         found = replace(found, manifest=replace(found.manifest, mode=options.mode))
     others = [checkpoints.newest(find_policy(each))[0] for each in options.average]
     policy = _mean([found, *others]) if others else None
-    checkpoints.export(found, options.folder, saved_config, policy, check=policy_of)
-    print(f"{options.folder}: {found.manifest.scenario}, {found.manifest.frames} frames, {found.manifest.mode}")
+    if others:
+        history = mean_of([each.history for each in (found, *others)])
+        found = replace(found, manifest=replace(found.manifest, history=history))
+    export(found, options.folder, saved_config, policy, check=policy_of)
+    told = f"{found.manifest.scenario}, {history_line(found.history)}, {found.manifest.mode}"
+    print(f"{options.folder}: {told}")
 
 
 def _mean(found: Sequence[checkpoints.Checkpoint]) -> dict[str, torch.Tensor]:
