@@ -253,6 +253,9 @@ def test_a_policy_keeps_the_evaluation_of_its_run_until_it_is_changed(run, tmp_p
     write_json(tmp_path / "run" / "evaluation.json", content)
     main([str(tmp_path / "run"), str(tmp_path / "older")])
     assert not newest(tmp_path / "older")[0].manifest.measured
+    (tmp_path / "run" / "evaluation.json").write_text("{}")
+    main([str(tmp_path / "run"), str(tmp_path / "damaged")])
+    assert "skipped: " in capsys.readouterr().err and not newest(tmp_path / "damaged")[0].manifest.measured
 
 
 def test_without_a_folder_the_card_is_printed(run, tmp_path, capsys):

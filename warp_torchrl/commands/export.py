@@ -42,6 +42,8 @@ from warp_torchrl.validation import did_you_mean
 
 FORMATS = ("checkpoint", "safetensors", *FILES)
 """Formats of an export."""
+EVALUATION = "evaluation.json"
+"""File of an evaluation."""
 _KEYS = ("format", "measured")
 
 
@@ -141,17 +143,30 @@ def _evaluations(given: object, path: Path, found: checkpoints.Checkpoint) -> li
     """
     if given is not None and not isinstance(given, list):
         raise ConfigError(f"measured must be a list of folders, measured=[{given}], got {given}")
-    folders = [Path(str(each)) for each in (given or ())]
-    own = path / "evaluation.json"
-    contents = [(own, read_evaluation(own))] if own.is_file() else []
-    results = [each for each in contents if each[1].get("frames") == found.manifest.frames]
-    files = [folder / "evaluation.json" for folder in folders]
-    results += [(file, read_evaluation(file)) for file in files]
+    files = [Path(str(folder)) / EVALUATION for folder in (given or ())]
+    own = path / EVALUATION
+    results = []
     try:
-        return [of_evaluation(content) for _, content in results]
+        if own.is_file():
+            result, frames = _result(own)
+            results = [result] if frames == found.manifest.frames else []
+    except ConfigError as error:
+        print(f"skipped: {error}", file=sys.stderr)
+    return [*results, *(_result(file)[0] for file in files)]
+
+
+def _result(path: Path) -> tuple[Measured, object]:
+    """Return the result in an evaluation, and the frames of its policy.
+
+    Raises:
+        ConfigError: If it is no evaluation.
+        OSError: If it cannot be opened.
+    """
+    content = read_evaluation(path)
+    try:
+        return of_evaluation(content), content.get("frames")
     except (KeyError, TypeError, ValueError):
-        names = ", ".join(str(file) for file, _ in results)
-        raise ConfigError(f"measured must be folders of evaluations, and one of {names} is none") from None
+        raise ConfigError(f"{path} is no evaluation with means, intervals and baselines") from None
 
 
 def _mean(found: Sequence[checkpoints.Checkpoint]) -> dict[str, torch.Tensor]:
