@@ -24,6 +24,7 @@ from warp_torchrl.commands.sweep import SweepSummary
 from warp_torchrl.evaluation import checks as checks_module
 from warp_torchrl.runs import checkpoint
 from warp_torchrl.runs.config import building
+from warp_torchrl.runs.export import export
 from warp_torchrl.system.lock import RunFolderLock
 from warp_torchrl.system.signals import Stopped
 from warp_torchrl.training import run as run_module
@@ -589,7 +590,7 @@ def test_a_run_starts_from_another_ones_networks_on_another_scenario(trained, ru
     ],
 )
 def test_a_start_that_is_none_is_refused_before_anything_is_written(trained, run_here, tmp_path, path, said, expected):
-    checkpoint.export(checkpoint.newest(trained[0])[0], tmp_path / "alone")
+    export(checkpoint.newest(trained[0])[0], tmp_path / "alone")
     path, *others = path.replace("run ", f"{trained[0]} ").split()
     code, errors, _ = run_here("train.py", *SHORT, f"start_from={path}", *others)
     assert code == expected and said in errors[-1] and len(errors) == 1
@@ -597,7 +598,7 @@ def test_a_start_that_is_none_is_refused_before_anything_is_written(trained, run
 
 
 def test_a_policy_alone_is_evaluated_as_its_run_was(trained, run_here, tmp_path):
-    checkpoint.export(checkpoint.newest(trained[0])[0], tmp_path / "alone")
+    export(checkpoint.newest(trained[0])[0], tmp_path / "alone")
     code, errors, _ = run_here("evaluate.py", "checkpoint=alone", "picture=null", "hydra.run.dir=seen")
     assert code == 0, errors
     ours, theirs = (json.loads((each / "evaluation.json").read_text()) for each in (tmp_path / "seen", trained[0]))

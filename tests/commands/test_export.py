@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 
+import numpy as np
 import pytest
 import torch
 
@@ -12,11 +13,24 @@ from tests.runs.test_checkpoint import SIGNATURE
 from tests.training.test_loop import tiny
 from warp_torchrl import load_policy
 from warp_torchrl.commands.export import main
+from warp_torchrl.env.metrics import METRICS
+from warp_torchrl.evaluation.report import report, write_json
 from warp_torchrl.models import ACTION
 from warp_torchrl.models.trust import Trust
 from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs import export as exports
+from warp_torchrl.runs import safe_weights
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
+from warp_torchrl.runs.policies.card import card
 from warp_torchrl.runs.policies.find import find_policy
+from warp_torchrl.runs.safe_weights import SAFE_WEIGHTS
+
+MEASURED = ("kept", "again", "other", "told")
+
+
+def episodes(value):
+    """Two episodes with all metrics of one value."""
+    return {name: np.full(2, value) for name in METRICS}
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +44,7 @@ def run(tmp_path_factory):
 @pytest.fixture
 def exported(run, tmp_path, capsys):
     main([str(run), str(tmp_path / "policies" / "tiny")])
-    assert "skirmish, 64 frames" in capsys.readouterr().out
+    assert "skirmish, 64 world steps in 1 training" in capsys.readouterr().out
     return tmp_path / "policies" / "tiny"
 
 
@@ -43,7 +57,12 @@ def test_it_acts_as_it_did(run, exported):
 
 
 def test_it_holds_nothing_of_training_and_says_so(exported):
-    assert sorted(each.name for each in exported.iterdir()) == ["config.json", "manifest.json", "policy.pt"]
+    assert sorted(each.name for each in exported.iterdir()) == [
+        "README.md",
+        "config.json",
+        "manifest.json",
+        "policy.pt",
+    ]
     found, _ = newest(exported)
     assert found.saved_config().values["total_frames"] == 64 and found.manifest.signature != SIGNATURE
     with pytest.raises(CheckpointError, match="holds a policy alone: it acts, and nothing goes on from it"):
@@ -87,7 +106,7 @@ def test_a_disk_that_refuses_leaves_nothing(run, tmp_path, monkeypatch):
     def refuses(*args):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(checkpoints.shutil, "copyfile", refuses)
+    monkeypatch.setattr(exports.shutil, "copyfile", refuses)
     with pytest.raises(SystemExit):
         main([str(run), str(tmp_path / "policy")])
     assert not (tmp_path / "policy").exists()
@@ -162,3 +181,83 @@ def test_networks_that_are_larger_than_the_machine_are_refused_before_they_are_m
     assert end.value.code == 4
     told = "the parameters have other names or shapes than the networks that it is said to have"
     assert told in capsys.readouterr().err and not (tmp_path / "made").exists()
+
+
+def test_safetensors_hold_the_same_bits_and_act_alike(run, tmp_path):
+    pytest.importorskip("safetensors")
+    main([str(run), str(tmp_path / "safe"), "format=safetensors"])
+    assert sorted(path.suffix for path in (tmp_path / "safe").iterdir()) == [".json", ".json", ".md", ".safetensors"]
+    ours, theirs = newest(tmp_path / "safe")[0].policy(), newest(run)[0].policy()
+    assert ours.keys() == theirs.keys()
+    for name, value in theirs.items():
+        assert ours[name].dtype == value.dtype and ours[name].numpy().tobytes() == value.numpy().tobytes()
+    now = tiny(tmp_path / "other").env.reset()
+    acted = [load_policy(each, "deterministic")(now.clone())[ACTION] for each in (tmp_path / "safe", run)]
+    assert torch.equal(*acted)
+    main([str(tmp_path / "safe"), str(tmp_path / "back")])
+    assert all(torch.equal(value, theirs[name]) for name, value in newest(tmp_path / "back")[0].policy().items())
+
+
+def test_an_altered_file_of_safetensors_is_refused(run, tmp_path):
+    pytest.importorskip("safetensors")
+    main([str(run), str(tmp_path / "safe"), "format=safetensors"])
+    path = tmp_path / "safe" / SAFE_WEIGHTS
+    path.write_bytes(b"\x80" + path.read_bytes()[1:])
+    with pytest.raises(CheckpointError, match="altered"):
+        load_policy(tmp_path / "safe")
+    forge(tmp_path / "safe")
+    with pytest.raises(CheckpointError, match=r"policy.safetensors cannot be read"):
+        load_policy(tmp_path / "safe")
+
+
+def test_safetensors_without_the_library_is_one_line(run, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(safe_weights, "find_spec", lambda name: None)
+    with pytest.raises(SystemExit) as refused:
+        main([str(run), str(tmp_path / "safe"), "format=safetensors"])
+    assert refused.value.code == 2 and not (tmp_path / "safe").exists()
+    assert 'pip install "warp_torchrl[safetensors]"' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["FOLDER", "format=onx"], "format must be one of checkpoint, safetensors, onnx, torch_export, got onx"),
+        (["format=torch_export"], "FOLDER must be given with format=torch_export"),
+        (["FOLDER", "format=torch_export", "--trust", "1"], "make a checkpoint: export that first, then with format="),
+        (["FOLDER", "measured=here"], "measured must be a list of folders, measured=[here], got here"),
+        (["FOLDER", "measured=[.]"], "evaluation.json"),
+    ],
+)
+def test_what_cannot_be_exported_is_one_line(run, tmp_path, monkeypatch, capsys, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as refused:
+        main([str(run), *arguments])
+    assert refused.value.code and said in capsys.readouterr().err.splitlines()[-1] and not list(tmp_path.iterdir())
+
+
+def test_a_policy_keeps_the_evaluation_of_its_run_until_it_is_changed(run, tmp_path, capsys):
+    shutil.copytree(run, tmp_path / "run")
+    few = {"saved": np.array([0.5, 0.7])}
+    content = report("ring", "mine", 7, episodes(0.0) | few, {"noop": episodes(0.0)}, frames=64)
+    write_json(tmp_path / "run" / "evaluation.json", content)
+    main([str(tmp_path / "run"), str(tmp_path / "kept")])
+    main([str(tmp_path / "kept"), str(tmp_path / "again")])
+    main([str(tmp_path / "kept"), str(tmp_path / "other"), "--average", str(run)])
+    main([str(tmp_path / "other"), str(tmp_path / "told"), f"measured=[{tmp_path / 'run'}]"])
+    kept, again, other, told = (newest(tmp_path / name)[0].manifest.measured for name in MEASURED)
+    assert kept == again == told and not other
+    (result,) = kept
+    assert (result.worlds, result.fires, result.first_seed, result.metric) == ("ring", 2, 7, "saved")
+    assert result.reached.mean == pytest.approx(0.6) and result.differences["noop"].mean == pytest.approx(0.6)
+    content = report("ring", "mine", 7, episodes(0.0), {}, frames=32)  # of an older checkpoint
+    write_json(tmp_path / "run" / "evaluation.json", content)
+    main([str(tmp_path / "run"), str(tmp_path / "older")])
+    assert not newest(tmp_path / "older")[0].manifest.measured
+    (tmp_path / "run" / "evaluation.json").write_text("{}")
+    main([str(tmp_path / "run"), str(tmp_path / "damaged")])
+    assert "skipped: " in capsys.readouterr().err and not newest(tmp_path / "damaged")[0].manifest.measured
+
+
+def test_without_a_folder_the_card_is_printed(run, tmp_path, capsys):
+    main([str(run)])
+    assert capsys.readouterr().out == card(newest(run)[0], run.name)

@@ -1,6 +1,7 @@
 """Small matches, and a run folder that goes on training."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -51,7 +52,7 @@ def run_folder(tmp_path):
         folder = run / "checkpoints" / str(frames)
         shutil.copytree(find_policy("skirmish"), folder)
         old = read_manifest(folder)
-        write_manifest(folder, frames, old.scenario, old.signature, old.mode)
+        write_manifest(folder, replace(old, frames=frames, history=()))
         return folder
 
     add(1000)

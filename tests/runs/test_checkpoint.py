@@ -18,6 +18,7 @@ from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
+from warp_torchrl.runs.export import export
 from warp_torchrl.runs.output import DRAFT
 
 ACTIONS = tuple(f"action_{code}" for code in range(11))
@@ -341,18 +342,18 @@ def test_a_policy_that_is_left_is_there_whenever_the_power_goes(tmp_path, monkey
 def test_an_export_appears_when_what_it_holds_was_loaded(tmp_path):
     saved(tmp_path, 1)
     found, seen = newest(tmp_path)[0], []
-    checkpoints.export(found, tmp_path / "out" / "made", check=lambda made: seen.append(made.policy()["weight"]))
+    export(found, tmp_path / "out" / "made", check=lambda made: seen.append(made.policy()["weight"]))
     assert seen[0].tolist() == newest(tmp_path / "out" / "made")[0].policy()["weight"].tolist() == [0, 1, 2, 3]
     with pytest.raises(CheckpointError, match="holds nan"):
-        checkpoints.export(found, tmp_path / "out" / "nan", policy={"weight": torch.tensor([math.nan])})
+        export(found, tmp_path / "out" / "nan", policy={"weight": torch.tensor([math.nan])})
 
     def refuse(made):
         raise CheckpointError("no")
 
     with pytest.raises(CheckpointError, match="no"):
-        checkpoints.export(found, tmp_path / "out" / "refused", check=refuse)
+        export(found, tmp_path / "out" / "refused", check=refuse)
     with pytest.raises(FileExistsError):
-        checkpoints.export(found, tmp_path / "out" / "made")
+        export(found, tmp_path / "out" / "made")
     assert [each.name for each in (tmp_path / "out").iterdir()] == ["made"]
 
 
@@ -362,7 +363,7 @@ def test_who_exports_into_one_folder_at_once_does_not_destroy_the_other_s(tmp_pa
 
     def one(number):
         try:
-            checkpoints.export(found, tmp_path / "made", policy={"weight": torch.full((4,), float(number))})
+            export(found, tmp_path / "made", policy={"weight": torch.full((4,), float(number))})
         except FileExistsError:
             return None
         return number

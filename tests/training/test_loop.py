@@ -18,10 +18,11 @@ from tests.world.mechanics.there import can_play
 from warp_torchrl.algorithms import parallel
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.checkpoint import CheckpointError, export, newest
+from warp_torchrl.runs.checkpoint import CheckpointError, newest
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, conf_folder, plain, without_targets
 from warp_torchrl.runs.config.saved_config import SavedConfig
+from warp_torchrl.runs.export import export
 from warp_torchrl.runs.policies.load import policy_of
 from warp_torchrl.system import disk
 from warp_torchrl.system.signals import DeferredSignals, Stopped

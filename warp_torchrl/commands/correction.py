@@ -16,6 +16,7 @@ from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
 from warp_torchrl.runs.config.construction import ENVIRONMENT, ConfigError, build_components
 from warp_torchrl.runs.config.saved_config import environment_config
 from warp_torchrl.runs.config.seeds import SEEDS, WORLDS, first_world_seed
+from warp_torchrl.runs.history import trained_steps
 from warp_torchrl.runs.policies.named_policy import NamedPolicy, fitted_policy
 from warp_torchrl.runs.policies.trained import MODES
 from warp_torchrl.validation import check_fields
@@ -84,7 +85,7 @@ class Correction:
         config = found.config(session.overrides)
         parts = build_components(config, ENVIRONMENT)
         self.session, self.person, self.scenario = session, person, str(config["scenario"])
-        self.frames, self.environment = found.checkpoint.manifest.frames, environment_config(config)
+        self.frames, self.environment = trained_steps(found.checkpoint.history), environment_config(config)
         self.env = WildfireEnv(
             parts["world"],
             observation=parts["observation"],

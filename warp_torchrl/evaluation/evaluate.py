@@ -22,6 +22,7 @@ from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.config.saved_config import completed
+from warp_torchrl.runs.history import history_line
 from warp_torchrl.runs.policies.load import policy_of
 from warp_torchrl.runs.policies.trained import MODES, TrainedPolicy
 from warp_torchrl.system import disk
@@ -58,10 +59,10 @@ def evaluate_policy(
     beside = baselines_of(run_config.world) if wanted is None else dict.fromkeys(wanted)
     others = _baselines(run_config, env, [each for each in beside if each != name])
     episodes = play(env, actor, first, mode, watch=True)
-    learner, digest, frames, other_modes = None, "", None, {}
+    learner, digest, frames, trained, other_modes = None, "", None, "", {}
     if isinstance(found, checkpoints.Checkpoint):
         learner, digest = method(completed(found.saved_config()))
-        frames = found.manifest.frames
+        frames, trained = found.manifest.frames, history_line(found.history)
         other_modes = {f"trained, {other}": play(env, actor, first, other) for other in MODES if other != mode}
     left_out = _without_each(env, actor, first, mode) if run_config.evaluation.leave_one_out else {}
     if map_fires is not None:
@@ -81,6 +82,7 @@ def evaluate_policy(
         configuration=digest,
         world_overrides=worlds,
         frames=frames,
+        trained=trained,
         goal=goal(run_config.world),
         maps=None if maps is None else maps.numbers(),
         rows=metric_rows(run_config.world),

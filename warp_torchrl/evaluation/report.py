@@ -52,6 +52,7 @@ def report(
     configuration: str = "",
     world_overrides: Sequence[str] = (),
     frames: int | None = None,
+    trained: str = "",
     goal: Goal = "saved",
 ) -> dict[str, Any]:
     """Return the content of ``evaluation.json``.
@@ -67,7 +68,8 @@ def report(
         method: The policy's name in tables of many runs; None takes ``policy``.
         configuration: Digest that distinguishes policies of one method.
         world_overrides: Overrides by which the worlds differ from the scenario.
-        frames: World steps of training; None for a heuristic.
+        frames: World steps of the last training; None for a heuristic.
+        trained: All trainings behind it in one line; empty for a heuristic.
         goal: What policies of the team are compared by.
     """
     if "noop" in others:
@@ -85,6 +87,7 @@ def report(
         "method": policy if method is None else method,
         "configuration": configuration,
         "frames": frames,
+        "trained": trained,
         "goal": goal,
         "seeds": seeds,
         "metrics": _summaries(episodes),
@@ -132,6 +135,7 @@ def evaluation_table(content: Mapping[str, Any], metrics: Sequence[Metric] = ())
         lines += _metric_lines([metric for metric in further if title in (metric.table, metric.name)], rows)
     lines += _behaviour_lines(content) if content["goal"] == "saved" else []
     lines += _left_out_lines(content)
+    lines += [f"trained: {content['trained']}"] if content["trained"] else []
     return "\n".join(lines)
 
 

@@ -30,7 +30,8 @@ class Result:
         method: Name in tables of many runs; None takes ``policy``.
         configuration: Digest that distinguishes policies of one method.
         world_overrides: Overrides by which the worlds differ from their scenario.
-        frames: World steps of training; None for what was not trained.
+        frames: World steps of its last training; None for what was not trained.
+        trained: Trainings behind it in one line; empty for what was not trained.
         goal: Metric by which policies of the team are compared.
         maps: Numbers of the maps; None where none were made.
         rows: Metrics of the worlds, for the table.
@@ -49,6 +50,7 @@ class Result:
     configuration: str = ""
     world_overrides: Sequence[str] = ()
     frames: int | None = None
+    trained: str = ""
     goal: Goal = "saved"
     maps: Mapping[str, Any] | None = None
     rows: Sequence[Metric] = ()
@@ -80,6 +82,7 @@ class Result:
             configuration=self.configuration,
             world_overrides=self.world_overrides,
             frames=self.frames,
+            trained=self.trained,
             goal=self.goal,
         )
         return content if self.maps is None else {**content, "maps": self.maps}

@@ -13,6 +13,7 @@ from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.history import trained_steps
 from warp_torchrl.runs.policies.named_policy import NamedPolicy, fitted_policy
 from warp_torchrl.runs.policies.trained import MODES, TrainedPolicy
 
@@ -41,8 +42,8 @@ class Player:
 
     @property
     def frames(self) -> int | None:
-        """Return the world steps that it was trained for; None for a baseline."""
-        return None if self.checkpoint is None else self.checkpoint.manifest.frames
+        """Return the world steps of all trainings behind it; None for a baseline."""
+        return None if self.checkpoint is None else trained_steps(self.checkpoint.history)
 
     def restart(self, seed: int) -> None:
         """Restart its random draws."""
@@ -83,7 +84,7 @@ class Player:
         except (checkpoints.CheckpointError, ConfigError, OSError) as error:
             return f"{self.name} keeps its weights: {' '.join(str(error).split())}"
         self.checkpoint = found
-        return f"{self.name} plays its newest weights, of {found.manifest.frames:,} steps"
+        return f"{self.name} plays its newest weights, of {self.frames:,} steps"
 
 
 def player_of(named: NamedPolicy, env: WildfireEnv, seed: int) -> Player:

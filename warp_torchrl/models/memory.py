@@ -104,24 +104,35 @@ class RecurrentActor(TensorDictModuleBase):
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write logits, and the memory before the step."""
         key, place = self._clock
-        fresh = tensordict.get(key)[..., place] == 1.0
         whole = tensordict.ndim == 2
-        before = tensordict.get(MEMORY)[:, 0] if whole else self._before(fresh)
-        seen = [tensordict.get(key) for key in self._seen]
-        kind = [tensordict.get(key) for key in (ROLE, AGENCY) if key in self.in_keys]
-        turned = ORIENTATION in self.in_keys
-        index = tensordict.get(ORIENTATION) if turned else torch.zeros_like(fresh, dtype=torch.int64)
-        logits, after = self.network(*seen, fresh, index, before, *kind).split(self.size, dim=-1)
+        before = tensordict.get(MEMORY)[:, 0] if whole else self._before(tensordict.get(key)[..., place])
+        logits, after = self.step(tensordict, before)
         if not whole:
             tensordict.set(MEMORY, before)
             self.remembered = after.detach()
         return tensordict.set(LOGITS, logits)
 
-    def _before(self, fresh: Tensor) -> Tensor:
-        """Return these agents' memory of the step before, float32 [B, A, M]; 0 for other agents."""
-        if self.remembered.shape[:-1] != fresh.shape:
-            return torch.zeros(*fresh.shape, self.size[1], device=fresh.device)
-        return self.remembered.to(fresh.device)  # where a policy was moved, its memory is still where it was
+    def step(self, tensordict: TensorDictBase, before: Tensor) -> tuple[Tensor, Tensor]:
+        """Return logits [..., A, actions] and the memory after the step [..., A, M]; nothing is kept.
+
+        Args:
+            tensordict: The entries.
+            before: Memory before the step, float32 [B, A, M].
+        """
+        key, place = self._clock
+        fresh = tensordict.get(key)[..., place] == 1.0
+        seen = [tensordict.get(key) for key in self._seen]
+        kind = [tensordict.get(key) for key in (ROLE, AGENCY) if key in self.in_keys]
+        turned = ORIENTATION in self.in_keys
+        index = tensordict.get(ORIENTATION) if turned else torch.zeros_like(fresh, dtype=torch.int64)
+        logits, after = self.network(*seen, fresh, index, before, *kind).split(self.size, dim=-1)
+        return logits, after
+
+    def _before(self, clock: Tensor) -> Tensor:
+        """Return the memory of the agents of a clock [B, A] after the step before, float32 [B, A, M]; 0 of others."""
+        if self.remembered.shape[:-1] != clock.shape:
+            return torch.zeros(*clock.shape, self.size[1], device=clock.device)
+        return self.remembered.to(clock.device)  # where a policy was moved, its memory is still where it was
 
 
 class Memories:

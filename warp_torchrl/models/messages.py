@@ -1,5 +1,7 @@
 """Networks whose agents talk: attention over the messages that each agent hears."""
 
+from typing import Any
+
 import torch
 from torch import Tensor, nn
 
@@ -60,11 +62,20 @@ class Round(nn.Module):
             sent: Features and index of the messages that arrive now; None: those given.
         """
         told = self.told(*((features, index) if sent is None else sent))
-        team = radio.shape[-2]
-        own = Orientation(index[..., None].expand(*index.shape, team))
-        heard = own.units(told[..., None, :, :].expand(*index.shape, team, -1))
-        place = own.offsets(radio[..., 1:] * RADIO_SCALE).to(heard.dtype)
-        key, value = self.hear(torch.cat((heard, place), dim=-1)).chunk(2, dim=-1)
+        return self.heard(features, radio, index, told[..., None, :, :].expand(*index.shape, radio.shape[-2], -1))
+
+    def heard(self, features: Tensor, radio: Tensor, index: Tensor, told: Tensor) -> Tensor:
+        """Return features with the attention over messages added that each agent may hear, [..., A, F].
+
+        Args:
+            features: [..., A, F].
+            radio: As in ``forward``, of n others, float32 [..., A, n, 3].
+            index: Of the agents' ``Orientation``, int64 [..., A].
+            told: Messages of the others in the orientation of the map, [..., A, n, M].
+        """
+        own = Orientation(index[..., None].expand(*index.shape, radio.shape[-2]))
+        place = own.offsets(radio[..., 1:] * RADIO_SCALE).to(told.dtype)
+        key, value = self.hear(torch.cat((own.units(told), place), dim=-1)).chunk(2, dim=-1)
         nothing = torch.zeros_like(key[..., :1, :])  # attended to by whom nobody reaches
         keys, values = (self._by_head(torch.cat((each, nothing), dim=-2)) for each in (key, value))
         hears = nn.functional.pad(radio[..., 0] > 0.5, (0, 1), value=True).flatten(0, -2)[:, None, None]
@@ -100,7 +111,7 @@ class TalkingNetwork(nn.Module):
         self, network: Network, size: int, message: int, rounds: int, is_late: bool = False, heads: int = 4
     ) -> None:
         super().__init__()
-        self.network, self.is_late = network, is_late
+        self.network, self.is_late, self.message = network, is_late, message
         self.rounds = nn.ModuleList(Round(size, message, heads) for _ in range(rounds))
 
     @property
@@ -125,6 +136,21 @@ class TalkingNetwork(nn.Module):
                 features = each(features, radio, index, sent)
         with network.arithmetic(device):
             return network.body[1:](features).to(torch.float32)
+
+    def exchange(self, radio: Tensor, told: Tensor, *inputs: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the outputs float32 [..., A, out] and the messages to send [..., A, M], where there is one round.
+
+        Args:
+            radio: float32 [..., A, n, 3] as in ``Round.heard``.
+            told: Messages of the n others, [..., A, n, M].
+            inputs: Present entries and index, as in ``forward``.
+        """
+        only: Any = self.rounds[0]
+        features, index = self._features(*inputs)
+        with torch.autocast(radio.device.type, enabled=False):
+            sends, features = only.told(features, index), only.heard(features, radio, index, told)
+        with self.network.arithmetic(radio.device.type):
+            return self.network.body[1:](features).to(torch.float32), sends
 
     def _features(self, *inputs: Tensor) -> tuple[Tensor, Tensor]:
         """Return the first layer's features, float32 [..., A, F], and the index of the agents' ``Orientation``."""

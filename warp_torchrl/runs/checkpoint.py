@@ -4,22 +4,23 @@
 ``weights_only=True``), ``config.json``, and ``manifest.json``, see ``warp_torchrl.runs.manifest``.
 """
 
-import errno
 import json
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
+from dataclasses import asdict, dataclass
+from pathlib import Path, PurePath
 from typing import Any
 
 import torch
 
 from warp_torchrl.models import Signature
 from warp_torchrl.runs.config.saved_config import SavedConfig, read_saved_config
+from warp_torchrl.runs.history import History, Teacher, stage_of, teacher_names, with_steps
 from warp_torchrl.runs.manifest import (
     MANIFEST,
     POLICY,
     TRAINING,
+    WEIGHTS,
     CheckpointError,
     Manifest,
     manifest_bytes,
@@ -28,6 +29,7 @@ from warp_torchrl.runs.manifest import (
     write_manifest,
 )
 from warp_torchrl.runs.output import draft_in, publish
+from warp_torchrl.runs.safe_weights import SAFE_WEIGHTS, read_safe_weights
 from warp_torchrl.system import disk
 from warp_torchrl.system.checksummed import read_mapping
 from warp_torchrl.system.foreign_text import plain_text
@@ -37,11 +39,12 @@ __all__ = [
     "MANIFEST",
     "Checkpoint",
     "CheckpointError",
-    "export",
     "holds_any",
     "leave_policy",
     "newest",
     "save",
+    "verified",
+    "write_saved_config",
 ]
 _LONGEST = 1000  # characters of a line that tells why a checkpoint is skipped
 
@@ -70,11 +73,25 @@ class Checkpoint:
 
     def policy(self) -> dict[str, torch.Tensor]:
         """Return the policy's parameters, all of them finite."""
-        parameters = self._load("policy.pt")
+        parameters = self._load(self.weights)
         for name, value in parameters.items():
             if not (isinstance(name, str) and isinstance(value, torch.Tensor)):
-                raise CheckpointError(f"{self.path / 'policy.pt'} must hold tensors by their names")
+                raise CheckpointError(f"{self.path / self.weights} must hold tensors by their names")
         return parameters
+
+    @property
+    def weights(self) -> str:
+        """Return the name of the file with the policy's parameters."""
+        return SAFE_WEIGHTS if SAFE_WEIGHTS in self.manifest.files else WEIGHTS
+
+    @property
+    def history(self) -> History:
+        """Return the trainings behind the policy; without a record the last one, by its configuration."""
+        if self.manifest.history:
+            return self.manifest.history
+        saved, of = self.saved_config(), self.manifest
+        teachers = [Teacher(name=plain_text(PurePath(name).name)) for name in teacher_names(saved.values)]
+        return (with_steps(stage_of(saved.choices, saved.values, of.scenario, (), teachers), of.frames),)
 
     def training(self) -> dict[str, Any]:
         """Return the training state, for a resume; all its numbers are finite."""
@@ -83,7 +100,7 @@ class Checkpoint:
 
     @property
     def goes_on(self) -> bool:
-        """Return whether there is a training state: an exported policy has none, see ``export``."""
+        """Return whether there is a training state: an exported policy has none, see ``warp_torchrl.runs.export``."""
         return TRAINING in self.manifest.files
 
     def check_goes_on(self) -> None:
@@ -98,7 +115,7 @@ class Checkpoint:
     def _load(self, name: str) -> dict[str, Any]:
         path = self.path / name
         with of_a_checkpoint():
-            content = load_tensors(path)
+            content = read_safe_weights(path) if name == SAFE_WEIGHTS else load_tensors(path)
             check_finite(path, content)
         if not isinstance(content, dict):
             raise CheckpointError(f"{path} must hold a mapping")
@@ -117,6 +134,7 @@ def save(
     training: Mapping[str, Any],
     keep: int,
     stays: Callable[[int], bool] = lambda frames: True,
+    history: History = (),
 ) -> Path:
     """Write a checkpoint, then delete old ones: the newest two stay, and the newest others that ``stays`` allows.
 
@@ -134,6 +152,7 @@ def save(
         training: The training state.
         keep: Number of checkpoints to keep, at least two.
         stays: Called with a checkpoint's frames; returns whether it may stay when two are newer.
+        history: See ``Manifest``.
 
     Returns:
         The checkpoint's folder.
@@ -146,10 +165,12 @@ def save(
     with draft_in(parent) as draft:
         if not _is_sound(final):
             with disk.with_path(draft):
-                disk.save_tensors(draft / "policy.pt", dict(policy))
+                disk.save_tensors(draft / WEIGHTS, dict(policy))
                 disk.save_tensors(draft / TRAINING, dict(training))
-                _write_saved_config(draft, saved_config)
-                write_manifest(draft, frames, scenario, signature, mode)
+                write_saved_config(draft, saved_config)
+                write_manifest(
+                    draft, Manifest(frames=frames, scenario=scenario, signature=signature, mode=mode, history=history)
+                )
             shutil.rmtree(final, ignore_errors=True)  # an unsound one
             publish(draft, parent, [final.name])
             disk.sync(run)  # where the folder of checkpoints may be new
@@ -157,54 +178,8 @@ def save(
     return final
 
 
-def export(
-    found: Checkpoint,
-    folder: Path,
-    saved_config: SavedConfig | None = None,
-    policy: Mapping[str, torch.Tensor] | None = None,
-    check: Callable[[Checkpoint], object] = lambda made: None,
-) -> None:
-    """Write a checkpoint without its training state into a new folder, which appears once its content was loaded.
-
-    Its configuration does not name the run from which the training started: other machines do not have that path.
-
-    Args:
-        found: The checkpoint.
-        folder: New folder.
-        saved_config: Configuration; None takes the checkpoint's.
-        policy: The policy's parameters; None takes the checkpoint's.
-        check: Called with the new checkpoint before the folder has its name; an error leaves nothing.
-
-    Raises:
-        CheckpointError: If its files cannot be read, or the copy differs from the original.
-        FileExistsError: If the folder exists.
-        OSError: If a write fails.
-    """
-    if folder.exists():
-        raise FileExistsError(errno.EEXIST, "it is there already", str(folder))
-    saved_config = found.saved_config() if saved_config is None else saved_config
-    saved_config = replace(saved_config, values={**saved_config.values, "start_from": None})
-    parameters = found.policy() if policy is None else policy
-    with draft_in(folder.parent) as draft, disk.with_path(folder):
-        if policy is None:
-            shutil.copyfile(found.path / "policy.pt", draft / "policy.pt")
-        else:
-            disk.save_tensors(draft / "policy.pt", dict(policy))
-        _write_saved_config(draft, saved_config)
-        of = found.manifest
-        write_manifest(draft, of.frames, of.scenario, of.signature, of.mode)
-        made = _verified(draft)
-        if made.saved_config() != saved_config or not _is_equal(made.policy(), parameters):
-            raise CheckpointError(f"{folder} cannot be written: what is read there is not what was written")
-        check(made)
-        publish(draft, folder.parent, [folder.name])
-
-
-def _is_equal(one: Mapping[str, torch.Tensor], other: Mapping[str, torch.Tensor]) -> bool:
-    return one.keys() == other.keys() and all(torch.equal(one[name], other[name].cpu()) for name in one)
-
-
-def _write_saved_config(folder: Path, saved_config: SavedConfig) -> None:
+def write_saved_config(folder: Path, saved_config: SavedConfig) -> None:
+    """Write the configuration of a checkpoint into its folder."""
     (folder / "config.json").write_text(json.dumps(asdict(saved_config), indent=1), encoding="utf-8")
 
 
@@ -216,8 +191,7 @@ def leave_policy(run: Path) -> None:
         OSError: If a write fails; all checkpoints stay.
     """
     found, _ = newest(run)
-    of = found.manifest
-    described = manifest_bytes(found.path, of.frames, of.scenario, of.signature, of.mode, POLICY)
+    described = manifest_bytes(found.path, found.manifest, POLICY)
     disk.replace(found.path / MANIFEST, described)  # from now on it has no training state
     (found.path / TRAINING).unlink(missing_ok=True)
     for folder in (each for each in _listed(run) if each != found.path):
@@ -243,13 +217,13 @@ def newest(path: Path | str) -> tuple[Checkpoint, list[str]]:
     """
     path = Path(path)
     if (path / MANIFEST).exists() or path.parent.name == "checkpoints":
-        return _verified(path), []
+        return verified(path), []
     if not path.is_dir():
         raise CheckpointError(f"{path} is not a run folder: nothing there")
     skipped: list[str] = []
     for folder in _listed(path):
         try:
-            return _verified(folder, frames=int(folder.name)), skipped
+            return verified(folder, frames=int(folder.name)), skipped
         except CheckpointError as error:
             skipped.append(plain_text(str(error), _LONGEST))
     reason = f": {skipped[0]}" if skipped else f": no folder in {path / 'checkpoints'}"
@@ -274,7 +248,7 @@ def _listed(run: Path) -> list[Path]:
     return sorted(folders, key=lambda each: int(each.name), reverse=True)
 
 
-def _verified(folder: Path, frames: int | None = None) -> Checkpoint:
+def verified(folder: Path, frames: int | None = None) -> Checkpoint:
     """Check every file of a checkpoint against its manifest before any of them is parsed."""
     manifest = read_manifest(folder)
     if frames not in (None, manifest.frames):
@@ -284,7 +258,7 @@ def _verified(folder: Path, frames: int | None = None) -> Checkpoint:
 
 def _is_sound(folder: Path) -> bool:
     try:
-        _verified(folder)
+        verified(folder)
     except CheckpointError:
         return False
     return True

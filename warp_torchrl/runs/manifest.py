@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,9 @@ import torchrl
 from warp_torchrl.entries import from_plain, to_plain
 from warp_torchrl.models import Entry, Signature
 from warp_torchrl.runs.config.compose import OPTION
+from warp_torchrl.runs.history import History, history_from_plain, history_to_plain
+from warp_torchrl.runs.measured import Measured, measured_from_plain, measured_to_plain
+from warp_torchrl.runs.safe_weights import SAFE_WEIGHTS
 from warp_torchrl.system.checksummed import (
     Files,
     Unsound,
@@ -29,9 +32,12 @@ FORMAT = 2
 """Version of the format that checkpoints are written in."""
 MANIFEST = "manifest.json"
 TRAINING = "training.pt"
-POLICY = ("policy.pt", "config.json")
+WEIGHTS = "policy.pt"
+POLICY = (WEIGHTS, "config.json")
 """Files of an exported policy."""
-_FILES = ("policy.pt", TRAINING, "config.json")
+SAFE_POLICY = (SAFE_WEIGHTS, "config.json")
+"""Files of a policy that is exported as safetensors."""
+_FILES = (WEIGHTS, TRAINING, "config.json")
 
 
 class CheckpointError(Unsound):
@@ -53,21 +59,25 @@ class Manifest:
 
     Attributes:
         format: Version of the format.
-        frames: World steps trained.
+        frames: World steps of this training alone; ``history`` has those before it.
         scenario: Name of the scenario.
         signature: Inputs and outputs of the policy.
         mode: The better mode on training seeds, ``sampled`` or ``deterministic``; None before it is known.
         versions: Versions of the libraries that wrote the checkpoint.
         files: Size and sha256 by file name.
+        history: The trainings behind the policy, this one last; empty where the writer kept none.
+        measured: Results of evaluations of this very policy.
     """
 
-    format: int
+    format: int = FORMAT
     frames: int
     scenario: str
     signature: Signature
     mode: str | None
-    versions: dict[str, str]
-    files: Files
+    versions: dict[str, str] = field(default_factory=dict)
+    files: Files = field(default_factory=dict)
+    history: History = ()
+    measured: tuple[Measured, ...] = ()
 
     def __post_init__(self) -> None:
         if type(self.frames) is not int or self.mode not in (None, "sampled", "deterministic"):
@@ -96,36 +106,45 @@ def _parse_manifest(folder: Path) -> Manifest:
     check_checksum(path, content)
     try:
         signature = _signature_from_json(content.pop("signature"))
-        manifest = Manifest(signature=signature, **content)
+        history = history_from_plain(content.pop("history", []))
+        measured = measured_from_plain(content.pop("measured", []))
+        manifest = Manifest(signature=signature, history=history, measured=measured, **content)
         files = checked_files(manifest.files)
     except (TypeError, KeyError, ValueError, AttributeError, OverflowError):
         raise CheckpointError(f"{path} is not a manifest of format {content['format']}") from None
-    if set(files) not in (set(_FILES), set(POLICY)):
+    if set(files) not in (set(_FILES), set(POLICY), set(SAFE_POLICY)):
         raise CheckpointError(f"{path} must list {', '.join(_FILES)}; a policy alone lists no {TRAINING}")
     return manifest
 
 
-def write_manifest(folder: Path, frames: int, scenario: str, signature: Signature, mode: str | None) -> None:
-    """Write the manifest of a folder that holds the other files; see ``Manifest``."""
-    names = [name for name in _FILES if (folder / name).exists()]
-    (folder / MANIFEST).write_bytes(manifest_bytes(folder, frames, scenario, signature, mode, names))
+def write_manifest(folder: Path, of: Manifest) -> None:
+    """Write the manifest of a folder that holds the other files; see ``manifest_bytes``."""
+    names = [name for name in (SAFE_WEIGHTS, *_FILES) if (folder / name).exists()]
+    (folder / MANIFEST).write_bytes(manifest_bytes(folder, of, names))
 
 
-def manifest_bytes(
-    folder: Path, frames: int, scenario: str, signature: Signature, mode: str | None, names: Iterable[str]
-) -> bytes:
-    """Return the manifest of a folder that holds the named files; see ``Manifest``."""
-    libraries = {"torch": torch, "torchrl": torchrl, "tensordict": tensordict}
-    manifest = Manifest(
-        format=FORMAT,
-        frames=frames,
-        scenario=scenario,
-        signature=signature,
-        mode=mode,
-        versions={name: library.__version__ for name, library in libraries.items()},
-        files=described(folder, names),
+def manifest_bytes(folder: Path, of: Manifest, names: Iterable[str]) -> bytes:
+    """Return the manifest of a folder that holds the named files.
+
+    Args:
+        folder: The folder.
+        of: What it says beside the versions and the files, which are those of now.
+        names: The files.
+    """
+    manifest = replace(of, format=FORMAT, versions=_versions(), files=described(folder, names))
+    return checksummed(
+        asdict(manifest)
+        | {
+            "signature": _signature_to_json(manifest.signature),
+            "history": history_to_plain(manifest.history),
+            "measured": measured_to_plain(manifest.measured),
+        }
     )
-    return checksummed(asdict(manifest) | {"signature": _signature_to_json(signature)})
+
+
+def _versions() -> dict[str, str]:
+    libraries = {"torch": torch, "torchrl": torchrl, "tensordict": tensordict}
+    return {name: library.__version__ for name, library in libraries.items()}
 
 
 def _signature_to_json(signature: Signature) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,9 @@ from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.runs.config.seeds import WORLDS
+from warp_torchrl.runs.history import History, Stage, stage_of, with_steps
 from warp_torchrl.runs.metrics_file import MetricsFile
+from warp_torchrl.runs.policies.teachers import teachers_of
 from warp_torchrl.runs.policies.trained import MODES
 from warp_torchrl.runs.saving import SaveClock, passes
 from warp_torchrl.system import disk
@@ -53,6 +56,8 @@ class Training(Learning):
         super().__init__(run_config)
         self.saved_config, self.run = saved_config, run
         self.is_first = parallel.rank() == 0
+        self.before: History = ()
+        """History of what it starts from."""
         self.seconds = 0.0
         self.saved_at = 0
         self.clock = SaveClock(run_config.checkpoint.minutes, self._size)
@@ -212,10 +217,32 @@ class Training(Learning):
                 training=training,
                 keep=self.run_config.checkpoint.keep,
                 stays=self._is_regular,
+                history=self.history,
             )
         self.saved_at = self.frames
         self.callbacks.call("on_checkpoint", self, path)
         return path
+
+    @property
+    def history(self) -> History:
+        """Return the trainings behind the policy as it is now, this one last."""
+        return (*self.before, with_steps(self._stage, self.frames))
+
+    @cached_property
+    def _stage(self) -> Stage:
+        """Return this training's stage at its start."""
+        values = self.saved_config.values
+        scenario, teachers = self.run_config.scenario, teachers_of(values)
+        return stage_of(self.saved_config.choices, values, scenario, self.before, teachers)
+
+    def start_from(self, found: checkpoints.Checkpoint) -> None:
+        """Load another run's networks, see ``Learning.start_from``, and take its history.
+
+        Raises:
+            CheckpointError: If that run had another kind of loss or other networks.
+        """
+        super().start_from(found)
+        self.before = found.history
 
     def _size(self) -> int:
         """Return the size of a checkpoint's tensors [bytes], as if all processes had as much as this one."""

@@ -127,6 +127,7 @@ class _Work:
         with parallel.processes(run.run_config.n_processes(), run.values, FOLLOWING):
             training = Training(run.run_config, run.saved_config, self.folder, self.callbacks)
             training.load_state_dict(run.found.training())
+            training.before = run.found.history[:-1]
             log.info("resumed %s at %d frames", run.found.path, training.frames)
             if run.run_config.total_frames != run.total_before:
                 # Before the next checkpoint: a run that is killed now must resume with the new total too.

@@ -37,7 +37,7 @@ class TrainedTeacher:
     in_keys = (ACTION_MASK, ROLE, AGENCY)
 
     def __init__(self, found: Checkpoint, name: str, env: WildfireEnv) -> None:
-        self._env, self._digest = env, found.manifest.files["policy.pt"]["sha256"]
+        self._env, self._digest = env, found.manifest.files[found.weights]["sha256"]
         self._observation: Observation = build(plain(restore(found.saved_config()))["observation"], "observation")
         worlds = WildfireEnv(env.world, observation=self._observation, n_worlds=1, device=env.device)
         self._policy = fitted_policy(found, worlds, name).to(env.device)

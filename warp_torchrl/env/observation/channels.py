@@ -117,7 +117,7 @@ def relative_elevation(look: Look) -> Tensor:
 
 @channel(content=lambda world, names: Empty() if world.sensing.is_limited else None)
 def threat(look: Look) -> Tensor:
-    """Return where the fire is about to grow, see ``Forecast.fire_risk``, 255 times."""
+    """Return where the fire is about to grow, 255 times: a tree's chance to ignite, a fire's expected ignitions."""
     return look.fire_risk
 
 

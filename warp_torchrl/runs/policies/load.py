@@ -26,7 +26,8 @@ def load_policy(path: str | Path = "generalist", mode: str = "best", plugins: Se
     Args:
         path: A run folder (its newest sound checkpoint), a checkpoint folder, or the name of a shipped policy, unless a
             folder has that name: ``generalist``, which plays every scenario in which a team sees the fire, or
-            ``default``, ``single`` or ``skirmish``, each trained for the scenario of its name.
+            ``default``, ``single`` or ``skirmish``, each trained for the scenario of its name. Or ``hf://OWNER/NAME``,
+            a repository of Hugging Face with an export as safetensors, see ``hub``.
         mode: ``sampled``, ``deterministic``, or ``best``: the better of the two on training seeds.
         plugins: Modules, or their names, of the user's own whose components the policy was trained with.
 
@@ -36,7 +37,7 @@ def load_policy(path: str | Path = "generalist", mode: str = "best", plugins: Se
 
     Raises:
         CheckpointError: If there is no sound checkpoint, or it does not fit.
-        ConfigError: If it was trained with plug-ins that are not listed.
+        ConfigError: If it was trained with plug-ins that are not listed, or a library that reads it is not installed.
         ValueError: If the mode is unknown.
     """
     load(plugins)
