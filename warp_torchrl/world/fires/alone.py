@@ -1,6 +1,5 @@
 """Fires without vehicles under law ``rate``: many on one map, in hourly weather, from ignition to an end."""
 
-import math
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -14,10 +13,11 @@ from torch import Tensor
 
 from warp_torchrl.system import memory
 from warp_torchrl.world.backends.growing import GrowingFires, Land, SpellInWindows
-from warp_torchrl.world.backends.spells import Highest, PlanesOfSpells, in_window, on_strips
+from warp_torchrl.world.backends.spells import PlanesOfSpells, in_window, strips
 from warp_torchrl.world.backends.spreading import Hour
 from warp_torchrl.world.behaviour.firebrands import Firebrands
-from warp_torchrl.world.fires.spell import BUT_FASTEST, Spell, air_in, can_ignite, heads, spread_in, ticks_of
+from warp_torchrl.world.fires.fastest import RowsOfMap, fastest_heads, heads_of_strips
+from warp_torchrl.world.fires.spell import Spell, air_in, can_ignite, heads, spread_in, ticks_of
 from warp_torchrl.world.fires.spotting import EmberGround, SpotFires
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER, travel
@@ -275,23 +275,24 @@ class Fires:
             made.append(torch.cat((times, heads(spread, self.runs_in_crowns)), dim=1))
         return (made[0] if len(made) == 1 else torch.cat(made)).flatten(0, 1)
 
-    def _head(self, number: int, law: RateFire, strip: Window) -> Tensor:
-        if strip.is_whole and self.groups == 1:
-            return self.planes(number, strip)[0, _HEAD]
-        spell = self.spells[number].fastest or self.spells[number]
-        return spread_in(law, self.landscape, self.cell_size, spell, strip).head[0]
-
     def _fastest_of(self, number: int) -> tuple[float, float]:
-        return tuple(map(max, zip(*(self._fastest_by(law, number) for law in self.laws), strict=True)))  # type: ignore[return-value]
+        low, high = zip(*(self._fastest_by(law, number) for law in self.laws), strict=True)
+        return max(low), max(high)
 
     def _fastest_by(self, law: RateFire, number: int) -> tuple[float, float]:
-        n_fuel, n_cells = int(self.fuel.sum()), self.fuel.numel()
-        of_fuel = Highest(n_fuel - max(1, math.ceil(BUT_FASTEST * n_fuel)) + 1)
-        of_all = Highest(n_cells - max(1, round(BUT_FASTEST * n_cells)) + 1)
-        for strip, head in on_strips(partial(self._head, number, law), self.size, self.workers):
-            of_fuel.add(head[strip.cut(self.fuel, False)])
-            of_all.add(head.flatten())
-        return of_fuel.least if n_fuel else 0.0, of_all.least
+        spell, rows = self.spells[number].fastest or self.spells[number], self._rows
+        if rows is not None:
+            fuel, heads = rows.fuel, iter([(rows.head(law, spell, self.cell_size), rows.fuel)])
+        elif self.groups == 1 and next(strips(self.size)).is_whole:
+            fuel, heads = self.fuel, iter([(self.planes(number, Window.whole(self.size))[0, _HEAD], self.fuel)])
+        else:
+            fuel = self.fuel
+            heads = heads_of_strips(law, self.landscape, self.cell_size, spell, fuel, self.workers)
+        return fastest_heads(heads, int(fuel.sum()), fuel.numel())
+
+    @cached_property
+    def _rows(self) -> RowsOfMap | None:
+        return RowsOfMap.of(self.landscape, self.fuel, self.cell_size)
 
 
 def arrival_minutes(
