@@ -182,14 +182,15 @@ def predict(
     met = spells_of(Weather(table=table, convergence=convergence, fields=fields), minutes, start)
     front = beside(ignition.cpu()) if is_seen else None
     who = Members.plain(fires) if members is None else members
-    burning = who.fires(law, ground, met, cell_size, front, embers)
+    order = who.in_octaves()
+    burning = who.part(order).fires(law, ground, met, cell_size, front, embers, by_octave=True)
     lit = ignition.cpu() & burning.fuel
     if not bool(lit.any()):
         raise ValueError(f"ignition must light a cell with fuel, none of its {int(ignition.sum())} cells has any")
     count = Counter(fires=burning, lit=lit, minutes=minutes, area=area)
-    tally = Tally(fires, minutes)
+    tally = Tally(fires, minutes, order)
     tally.check(Window.about(lit))
-    for part in burning.in_parts(lit, world_key(seed + torch.arange(fires)), count, count.most_cells):
+    for part in burning.in_parts(lit, world_key(seed + order), count, count.most_cells):
         tally.add(part)
         if progress is not None:
             progress(len(part.left))

@@ -60,6 +60,8 @@ class Fires:
         rate: Factor on the rates of each fire, float32 [B], or in each of S sectors, float32 [B, S]; None is 1.
         sector: The sector of each cell, int64 [H, W].
         swiftest: Highest of these factors; it shortens ticks.
+        octave: Half octaves in which the factors lie, int64 [B], equal ones side by side: fires of one burn together, in
+            ticks of their own, so that slow fires do not take those of the fastest one. None: all take ``swiftest``.
         half_way: Cells that the fire has come half-way to at the start, bool [H, W]: those about a perimeter, whose
             front is half a cell ahead of the last cell inside, on average; None where it starts in its cells' middle.
         embers: Firebrands that start fires ahead; None: none fly.
@@ -75,6 +77,7 @@ class Fires:
     rate: Tensor | None = None
     sector: Tensor | None = None
     swiftest: float = 1.0
+    octave: Tensor | None = None
     half_way: Tensor | None = None
     embers: Firebrands | None = None
     root: "Fires | None" = field(default=None, repr=False)
@@ -123,6 +126,8 @@ class Fires:
         Returns:
             float32 [G, 7, h, w], or 8 where fires run in crowns; the heads as in ``passing.HeadBehaviour``.
         """
+        if self.root is not None and self.root.groups == 1:
+            return self.root.planes(number, window)
         made = self._made(number, window)
         return made.view(-1, 8 if self.runs_in_crowns else 7, *made.shape[1:])
 
@@ -161,7 +166,10 @@ class Fires:
         spells = [spell.of(fires) for spell in self.spells]
         if self.groups == 1 and rate is None:
             return self
-        return replace(self, fire=laws[0], beside=laws[1:], spells=spells, rate=rate, root=self.root or self)
+        swiftest = self.swiftest if self.octave is None else swiftest_of(self.octave[fires.start])
+        return replace(
+            self, fire=laws[0], beside=laws[1:], spells=spells, rate=rate, swiftest=swiftest, root=self.root or self
+        )
 
     def burn(self, lit: Tensor, key: Tensor, most: int | None = None) -> Burned:
         """Burn some fires at once, to the end of the weather.
@@ -207,6 +215,8 @@ class Fires:
 
         def parts(whole: slice, size: int) -> Iterator[slice]:
             """Yield parts of whole laws where some fit, else of one law each."""
+            if self.octave is not None:
+                return (less for like in _alike(self.octave, whole) for less in _parts(like, size))
             if size >= each or not self.beside:
                 return _parts(whole, size - size % each if self.beside else size)
             return (less for law in _parts(whole, each) for less in _parts(law, size))
@@ -295,6 +305,16 @@ class Fires:
         return RowsOfMap.of(self.landscape, self.fuel, self.cell_size)
 
 
+def octaves_of(rate: Tensor) -> Tensor:
+    """Return the half octave in which each factor on a fire's rates lies, int64, shape of the factors, float32."""
+    return (2.0 * rate.log2() - 1e-4).ceil().to(torch.int64)
+
+
+def swiftest_of(octave: Tensor | int) -> float:
+    """Return the highest factor of a half octave."""
+    return float(2.0 ** (0.5 * float(octave)))
+
+
 def arrival_minutes(
     fire: RateFire,
     landscape: Landscape,
@@ -340,6 +360,14 @@ def _parts(whole: slice, size: int) -> Iterator[slice]:
     """Yield ``size`` fires at a time."""
     begins = range(whole.start, whole.stop, size)
     yield from (slice(begin, min(begin + size, whole.stop)) for begin in begins)
+
+
+def _alike(octave: Tensor, whole: slice) -> Iterator[slice]:
+    """Yield the runs of fires of one octave."""
+    begin = whole.start
+    for count in octave[whole].unique_consecutive(return_counts=True)[1].tolist():
+        yield slice(begin, begin + count)
+        begin += count
 
 
 def _side_by_side(

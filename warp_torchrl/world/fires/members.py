@@ -11,7 +11,7 @@ from warp_torchrl.world.arrays.random import Stream, log_deviation, normal, unif
 from warp_torchrl.world.behaviour.firebrands import Firebrands
 from warp_torchrl.world.behaviour.moistures import MOISTURES, in_force, moisture_row
 from warp_torchrl.world.ensemble.parameters import PARAMETERS, Deviations
-from warp_torchrl.world.fires.alone import Fires
+from warp_torchrl.world.fires.alone import Fires, octaves_of
 from warp_torchrl.world.fires.sectors import SECTORS, STOPPED, sectors_about
 from warp_torchrl.world.fires.spell import Spell, can_ignite, spread_in
 from warp_torchrl.world.law.rate import RateFire
@@ -88,8 +88,12 @@ class Members:
         chance = uniform(key, tick, Stream.HELD, (SECTORS,))
         return Members(self.values, (log_deviation(local) * draws).exp(), chance < held, sector)
 
-    def part(self, members: slice) -> "Members":
-        """Return some of the members."""
+    def in_octaves(self) -> Tensor:
+        """Return the order in which members of one half octave of rates stand side by side, int64 [K]."""
+        return octaves_of(self.rate).argsort(stable=True)
+
+    def part(self, members: slice | Tensor) -> "Members":
+        """Return some of the members, or all in another order."""
         local, held = (None if each is None else each[members] for each in (self.local, self.held))
         return Members(self.values[members], local, held, self.sector)
 
@@ -136,6 +140,7 @@ class Members:
         cell_size: float,
         half_way: Tensor | None = None,
         embers: Firebrands | None = None,
+        by_octave: bool = False,
     ) -> Fires:
         """Return the members' fires on a map, one of each.
 
@@ -146,6 +151,8 @@ class Members:
             cell_size: Side of a cell [m].
             half_way: See ``Fires``.
             embers: See ``Fires``.
+            by_octave: Whether fires of different half octaves burn apart, each in ticks as short as it needs; members
+                of one must stand side by side, see ``in_octaves``.
         """
         met = spells if not bool(self.values[:, 1:].any()) else [self._spell(fire, spell) for spell in spells]
         rate = self._rates()
@@ -157,6 +164,7 @@ class Members:
             rate=rate,
             sector=self.sector,
             swiftest=max(1.0, float(self.rate.max())),
+            octave=octaves_of(self.rate) if by_octave and rate is not None else None,
             half_way=half_way,
             embers=embers,
         )
