@@ -214,6 +214,7 @@ def _burn(case: Case, options: PredictionOptions, corrected: Corrected | None) -
             members=members,
             is_seen=corrected is not None,
             embers=options.firebrands if options.embers else None,
+            later=case.later,
             keep_every=options.arrivals,
             progress=bar.update,
         )
@@ -239,7 +240,8 @@ def _report(
         "wind height": case.weather.wind_height,
         "grid convergence [degrees]": round(case.convergence, 3),
         "start [minutes after the first row]": case.start,
-        "ignition": f"{values['ignition']}, {int(prediction.lit.sum())} cells with fuel of {int(case.ignition.sum())}",
+        "ignition": f"{values['ignition']}, {int(prediction.lit.sum())} cells with fuel of {_marked(case)}",
+        **_barriers(case, values),
         "cells of fuels": case.fire.told_fuel(case.ground),
         **dict(each.split(": ", 1) for each in case.files),
         "law": without_targets(values["fire"]),
@@ -254,6 +256,18 @@ def _report(
         "configuration": without_targets(values),
         "seconds": seconds,
     }
+
+
+def _marked(case: Case) -> int:
+    """Return how many cells the ignition marks."""
+    return int((case.ignition if case.later is None else case.ignition | case.later.isfinite()).sum())
+
+
+def _barriers(case: Case, values: Mapping[str, Any]) -> dict[str, str]:
+    """Return what is read of barriers; nothing where there are none."""
+    if case.closed is None:
+        return {}
+    return {"barriers": f"{values['barriers']}, {int(case.closed.sum())} cells that no fire enters"}
 
 
 def _write(folder: Path, prediction: Prediction, case: Case, options: PredictionOptions, title: str) -> None:

@@ -12,11 +12,12 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.system import memory
-from warp_torchrl.world.backends.growing import GrowingFires, Land, SpellInWindows
+from warp_torchrl.world.backends.growing import Embers, GrowingFires, Land, SpellInWindows
 from warp_torchrl.world.backends.spells import PlanesOfSpells, in_window, strips
 from warp_torchrl.world.backends.spreading import Hour
 from warp_torchrl.world.behaviour.firebrands import Firebrands
 from warp_torchrl.world.fires.fastest import RowsOfMap, fastest_heads, heads_of_strips
+from warp_torchrl.world.fires.later import LaterFires
 from warp_torchrl.world.fires.spell import Spell, air_in, can_ignite, heads, spread_in, ticks_of
 from warp_torchrl.world.fires.spotting import EmberGround, SpotFires
 from warp_torchrl.world.law.rate import RateFire
@@ -60,11 +61,12 @@ class Fires:
         rate: Factor on the rates of each fire, float32 [B], or in each of S sectors, float32 [B, S]; None is 1.
         sector: The sector of each cell, int64 [H, W].
         swiftest: Highest of these factors; it shortens ticks.
-        octave: Half octaves in which the factors lie, int64 [B], equal ones side by side: fires of one burn together, in
-            ticks of their own, so that slow fires do not take those of the fastest one. None: all take ``swiftest``.
+        octave: Half octaves in which the factors lie, int64 [B], equal ones side by side: fires of one burn together,
+            in ticks of their own, so that slow fires do not take those of the fastest one. None: all take ``swiftest``.
         half_way: Cells that the fire has come half-way to at the start, bool [H, W]: those about a perimeter, whose
             front is half a cell ahead of the last cell inside, on average; None where it starts in its cells' middle.
         embers: Firebrands that start fires ahead; None: none fly.
+        later: When further cells are lit, float32 [H, W] [minutes], infinite where they are not; None: none are.
         root: All fires, where these are some of them (``of``).
         workers: Threads.
     """
@@ -80,6 +82,7 @@ class Fires:
     octave: Tensor | None = None
     half_way: Tensor | None = None
     embers: Firebrands | None = None
+    later: Tensor | None = None
     root: "Fires | None" = field(default=None, repr=False)
     workers: int = field(default_factory=torch.get_num_threads)
     _lock: threading.Lock = field(init=False, repr=False, default_factory=threading.Lock)
@@ -183,8 +186,15 @@ class Fires:
             ValueError: If their window does not fit in memory.
         """
         land = Land(lambda window: window.cut(self.fuel, False), lambda window: self.pace(key, window))
-        fires = GrowingFires(lit, len(key), land, most, partial(self._check, len(key)))
-        embers = None if self.embers is None else SpotFires(self.embers, self._ember_ground(), key)
+        embers: Embers | None = None
+        if self.embers is not None:
+            embers = SpotFires(self.embers, self._ember_ground(), key)
+        about = lit
+        if self.later is not None:
+            later = torch.where(self.fuel, self.later, torch.inf)
+            embers = LaterFires(later, len(key), embers)
+            about = lit if bool(lit.any()) else later.isfinite()
+        fires = GrowingFires(lit, len(key), land, most, partial(self._check, len(key)), about)
         fires.burn_spells((self._going(number) for number in range(len(self.spells))), embers)
         return Burned(fires.window, fires.arrival(), self.pace(key, fires.window), self)
 

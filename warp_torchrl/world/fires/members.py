@@ -141,6 +141,7 @@ class Members:
         half_way: Tensor | None = None,
         embers: Firebrands | None = None,
         by_octave: bool = False,
+        later: Tensor | None = None,
     ) -> Fires:
         """Return the members' fires on a map, one of each.
 
@@ -153,6 +154,7 @@ class Members:
             embers: See ``Fires``.
             by_octave: Whether fires of different half octaves burn apart, each in ticks as short as it needs; members
                 of one must stand side by side, see ``in_octaves``.
+            later: See ``Fires``.
         """
         met = spells if not bool(self.values[:, 1:].any()) else [self._spell(fire, spell) for spell in spells]
         rate = self._rates()
@@ -167,6 +169,7 @@ class Members:
             octave=octaves_of(self.rate) if by_octave and rate is not None else None,
             half_way=half_way,
             embers=embers,
+            later=later,
         )
 
     def pace(self, fire: RateFire, landscape: Landscape, spell: Spell, cell_size: float, window: Window) -> Tensor:
