@@ -43,7 +43,7 @@ from warp_torchrl.runs.config.construction import ConfigError, build, construct
 from warp_torchrl.runs.config.grammar import check_flags
 from warp_torchrl.runs.config.options import PredictionOptions
 from warp_torchrl.runs.output import output_folder
-from warp_torchrl.system import disk
+from warp_torchrl.system import disk, memory
 from warp_torchrl.system.provenance import Provenance, gathered
 from warp_torchrl.world.air.folder import times_of
 from warp_torchrl.world.air.weather import Weather
@@ -88,7 +88,7 @@ def composed(overrides: Sequence[str]) -> dict[str, Any]:
 
 
 def _run(arguments: Sequence[str]) -> None:
-    began = time.perf_counter()
+    began, program = time.perf_counter(), memory.most_used()
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     values = composed(arguments)
     options: PredictionOptions = construct(
@@ -105,6 +105,7 @@ def _run(arguments: Sequence[str]) -> None:
         seconds = {"fires": time.perf_counter() - fires_began, "all": time.perf_counter() - began}
         report = _report(prediction, case, values, files, seconds)
         _write(draft, prediction, case, options, report["title"])
+        report["gigabytes"] = {"most": memory.most_used() / 1e9, "program": program / 1e9, "map": _bytes(case) / 1e9}
         text = page(report)
         if corrected is not None:
             report["observed"] = observed_numbers(corrected, case.cell_size)
@@ -256,6 +257,11 @@ def _report(
         "configuration": without_targets(values),
         "seconds": seconds,
     }
+
+
+def _bytes(case: Case) -> int:
+    """Return the bytes of the map's layers."""
+    return sum(leaf.numel() * leaf.element_size() for leaf in case.ground.leaves().values())
 
 
 def _marked(case: Case) -> int:

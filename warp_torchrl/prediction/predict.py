@@ -45,6 +45,7 @@ class Prediction:
     lit: Tensor  # where fires were lit, at the start or later, bool [H, W]
     ground: Landscape  # batch size [1]
     cell_size: float  # side of a cell [m]
+    at_once: int = 1  # most fires that burned together
     every: Tensor | None = None  # when each fire came, float32 [B, h, w] [min], NaN where it did not; where kept
 
     @property
@@ -185,8 +186,8 @@ def predict(
     met = spells_of(Weather(table=table, convergence=convergence, fields=fields), minutes, start)
     front = beside(ignition.cpu()) if is_seen else None
     who = Members.plain(fires) if members is None else members
-    order = who.in_octaves()
-    burning = who.part(order).fires(law, ground, met, cell_size, front, embers, by_octave=True, later=later)
+    order = who.by_pace()
+    burning = who.part(order).fires(law, ground, met, cell_size, front, embers, in_paces=True, later=later)
     lit = ignition.cpu() & burning.fuel
     every = lit if later is None else lit | (burning.fuel & (later <= minutes))
     if not bool(every.any()):
@@ -231,6 +232,7 @@ def _prediction(tally: Tally, count: Counter, ever_lit: Tensor, keep_every: bool
         lit=ever_lit,
         ground=fires.landscape,
         cell_size=fires.cell_size,
+        at_once=tally.at_once,
         every=tally.every()[:, :, : window.width] if keep_every else None,
     )
 

@@ -63,6 +63,11 @@ class Tally:
         return self._window
 
     @property
+    def at_once(self) -> int:
+        """Return the most fires of one part."""
+        return max(len(count.left) for count in self._counts)
+
+    @property
     def first(self) -> Tensor:
         """Return when the first fire came, float32 [h, w] [minutes]; NaN where it did not."""
         plane = torch.full(self._came.shape, torch.nan)

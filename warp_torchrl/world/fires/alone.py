@@ -25,7 +25,8 @@ from warp_torchrl.world.law.travel import NEVER, travel
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.state.window import Window
 
-_AT_ONCE = 64  # fires, whose planes a CPU's cache holds
+AT_ONCE = 64
+"""Fires that burn at once at most, whose planes a CPU's cache holds."""
 _MOST_CELLS = 2**24  # of the windows of fires that burn at once
 _BYTES_A_FIRE, _BYTES_A_CELL = 64, 200  # that a cell of a window takes at most, for each fire and for the map
 _BYTES_OF_GROUP = 96  # that a cell takes for the planes of each group
@@ -61,8 +62,8 @@ class Fires:
         rate: Factor on the rates of each fire, float32 [B], or in each of S sectors, float32 [B, S]; None is 1.
         sector: The sector of each cell, int64 [H, W].
         swiftest: Highest of these factors; it shortens ticks.
-        octave: Half octaves in which the factors lie, int64 [B], equal ones side by side: fires of one burn together,
-            in ticks of their own, so that slow fires do not take those of the fastest one. None: all take ``swiftest``.
+        swift: Highest of the factors of the fires that each burns with, float32 [B], equal ones side by side, so that
+            slow fires do not take the ticks of the swiftest one. None: all take ``swiftest``.
         half_way: Cells that the fire has come half-way to at the start, bool [H, W]: those about a perimeter, whose
             front is half a cell ahead of the last cell inside, on average; None where it starts in its cells' middle.
         embers: Firebrands that start fires ahead; None: none fly.
@@ -79,7 +80,7 @@ class Fires:
     rate: Tensor | None = None
     sector: Tensor | None = None
     swiftest: float = 1.0
-    octave: Tensor | None = None
+    swift: Tensor | None = None
     half_way: Tensor | None = None
     embers: Firebrands | None = None
     later: Tensor | None = None
@@ -169,7 +170,7 @@ class Fires:
         spells = [spell.of(fires) for spell in self.spells]
         if self.groups == 1 and rate is None:
             return self
-        swiftest = self.swiftest if self.octave is None else swiftest_of(self.octave[fires.start])
+        swiftest = self.swiftest if self.swift is None else float(self.swift[fires.start])
         return replace(
             self, fire=laws[0], beside=laws[1:], spells=spells, rate=rate, swiftest=swiftest, root=self.root or self
         )
@@ -210,7 +211,7 @@ class Fires:
         Raises:
             ValueError: If the window of one fire does not fit in memory.
         """
-        limit, each = [_AT_ONCE], max(1, len(key) // len(self.laws))
+        limit, each = [AT_ONCE], max(1, len(key) // len(self.laws))
 
         def burned(part: slice) -> list[T]:
             count = part.stop - part.start
@@ -225,15 +226,15 @@ class Fires:
 
         def parts(whole: slice, size: int) -> Iterator[slice]:
             """Yield parts of whole laws where some fit, else of one law each."""
-            if self.octave is not None:
-                return (less for like in _alike(self.octave, whole) for less in _parts(like, size))
+            if self.swift is not None:
+                return (less for like in _alike(self.swift, whole) for less in _parts(like, size))
             if size >= each or not self.beside:
                 return _parts(whole, size - size % each if self.beside else size)
             return (less for law in _parts(whole, each) for less in _parts(law, size))
 
         self._ended.clear()
         workers = 1 if lit.is_cuda else self.workers
-        for found in _side_by_side(burned, parts(slice(0, len(key)), _AT_ONCE), workers, self._ended):
+        for found in _side_by_side(burned, parts(slice(0, len(key)), AT_ONCE), workers, self._ended):
             yield from found
 
     def pace(self, key: Tensor, window: Window) -> Tensor:
@@ -315,16 +316,6 @@ class Fires:
         return RowsOfMap.of(self.landscape, self.fuel, self.cell_size)
 
 
-def octaves_of(rate: Tensor) -> Tensor:
-    """Return the half octave in which each factor on a fire's rates lies, int64, shape of the factors, float32."""
-    return (2.0 * rate.log2() - 1e-4).ceil().to(torch.int64)
-
-
-def swiftest_of(octave: Tensor | int) -> float:
-    """Return the highest factor of a half octave."""
-    return float(2.0 ** (0.5 * float(octave)))
-
-
 def arrival_minutes(
     fire: RateFire,
     landscape: Landscape,
@@ -372,10 +363,10 @@ def _parts(whole: slice, size: int) -> Iterator[slice]:
     yield from (slice(begin, min(begin + size, whole.stop)) for begin in begins)
 
 
-def _alike(octave: Tensor, whole: slice) -> Iterator[slice]:
-    """Yield the runs of fires of one octave."""
+def _alike(swift: Tensor, whole: slice) -> Iterator[slice]:
+    """Yield the runs of fires that take the same ticks."""
     begin = whole.start
-    for count in octave[whole].unique_consecutive(return_counts=True)[1].tolist():
+    for count in swift[whole].unique_consecutive(return_counts=True)[1].tolist():
         yield slice(begin, begin + count)
         begin += count
 
