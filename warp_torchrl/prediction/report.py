@@ -44,8 +44,8 @@ def page(found: Mapping[str, Any]) -> str:
         "",
         f"{found['fires']} fires of {_hours(found['followed_minutes'])}, warp_torchrl {found['version']}, "
         f"{found['seconds']['all']:.1f} s in all, {found['seconds']['fires']:.1f} s of it the fires.",
-        f"Up to {found['at_once']} fires at a time; memory {held['most']:.2f} GB at most, {held['program']:.2f} GB of it "
-        f"the program, {held['map']:.2f} GB the map's layers.",
+        f"Up to {found['at_once']} fires at a time; memory {held['most']:.2f} GB at most, of it the program "
+        f"{held['program']:.2f} GB, the map's layers {held['map']:.2f} GB.",
         "",
         f"- area burned: {area['median']:,.0f} ha (5 % to 95 %: {area['low']:,.0f} to {area['high']:,.0f} ha)",
         f"- came to the map's edge: {found['left_map']:.0%} of the fires",
