@@ -36,7 +36,7 @@ class MapPlace:
 
 
 def layers(prediction: Prediction) -> Iterator[tuple[str, dict[str, Tensor]]]:
-    """Yield each GeoTIFF's name and its bands, made when it is asked for; times in hours."""
+    """Yield each GeoTIFF's name and its bands, one after the other; times in hours."""
     yield "burn_probability", {"burn_probability": prediction.burn_probability}
     yield (
         "arrival_hours",

@@ -1,4 +1,4 @@
-"""Rates of the fastest heads on a map, which set how long ticks are."""
+"""Rates of the fastest heads on a map, for the length of ticks."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -22,7 +22,7 @@ _LEAST_FUEL = 2**12  # cells among them that can ignite; where there are fewer, 
 
 @dataclass(frozen=True, eq=False)
 class RowsOfMap:
-    """Rows of a large map, evenly apart, that stand for all of it: what they cost does not grow with the map."""
+    """Rows of a large map, evenly apart, as a sample of it."""
 
     ground: Landscape  # of these rows, batch size [1]
     rise: Tensor  # see ``fuel_bed.gradient``, float32 [1, 2, R, W]

@@ -1,4 +1,4 @@
-"""Cells that are lit after the start of fires without vehicles, at their times."""
+"""Later ignitions of fires without vehicles."""
 
 import torch
 from torch import Tensor
@@ -7,7 +7,7 @@ from warp_torchrl.world.backends.growing import Caught, Embers
 
 
 class LaterFires:
-    """Cells of the map that are lit at their times in each of some fires, beside what embers start.
+    """Later ignitions in each of some fires, beside those by embers.
 
     Args:
         minutes: When each cell is lit, float32 [H, W], in minutes since the start; infinite where it is not.

@@ -1,4 +1,4 @@
-"""Barriers on a map: roads, rivers and dozer lines, as the cells that a fire cannot enter."""
+"""Barriers on a map: roads, rivers and dozer lines as cells without fire."""
 
 from os import PathLike
 from pathlib import Path
@@ -14,8 +14,8 @@ _NAME = "barriers"
 def read_barriers(path: str | PathLike[str], grid: Grid, width: float = 0.0) -> np.ndarray:
     """Return the cells of a grid that barriers close, bool [rows, columns].
 
-    A line closes the cells that it touches, and those whose middle is within half of its width; a polygon those that
-    ``vector.mark`` says. Fire goes across corners, so no two of them hang together by a corner alone.
+    A line closes the cells that it touches, and those whose middle is within half of its width; a polygon the cells
+    of ``vector.mark``. Fire goes across corners, so no two of them hang together by a corner alone.
 
     Args:
         path: GeoJSON or a shapefile of lines or polygons.
