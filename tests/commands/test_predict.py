@@ -120,7 +120,54 @@ def test_an_ignition_may_be_a_raster(folder):
     assert np.array_equal(one, other)
 
 
+def test_ignitions_with_times_burn_from_then_on(folder):
+    (folder / "later.csv").write_text("row,column,time\n20,10,2024-07-01 12:30\n30,30,2024-07-01 13:00\n")
+    (folder / "hours.csv").write_text("row,column,hour\n30,30,1\n20,10,0.5\n")
+    given = {"fires": 1, "ignition": folder / "later.csv"}
+    assert main(arguments(folder, **given)) == 0
+    assert main(arguments(folder, **{**given, "ignition": folder / "hours.csv"}, out=folder / "hours")) == 0
+    assert main(arguments(folder, **given, start=15, out=folder / "before")) == 0
+    one, same, before = (read(folder / name / "arrival_hours.tif") for name in ("out", "hours", "before"))
+    assert one[20, 10] == 0.0 and one[30, 30] == pytest.approx(0.5, abs=1e-4) and np.nanmin(one[28:33, 28:33]) > 0.499
+    assert np.array_equal(one, same, equal_nan=True)
+    assert before[20, 10] == pytest.approx(0.25, abs=1e-4) and before[30, 30] == pytest.approx(0.75, abs=1e-4)
+    report = json.loads((folder / "out" / "report.json").read_text())
+    assert report["inputs"]["start [minutes after the first row]"] == 30.0
+    assert report["inputs"]["ignition"].endswith("2 cells with fuel of 2")
+
+
+def test_no_fire_crosses_a_barrier(folder):
+    line = {"type": "LineString", "coordinates": [[5e5 + 1000.0, -100.0], [5e5 + 1000.0, 5e4]]}
+    (folder / "road.geojson").write_text(json.dumps({**line, "crs": {"properties": {"name": "EPSG:32631"}}}))
+    given = {"hours": 3, "fires": 2}
+    assert main(arguments(folder, **given)) == 0
+    assert main(arguments(folder, **given, barriers=folder / "road.geojson", out=folder / "road")) == 0
+    free, held = (read(folder / name / "burn_probability.tif") for name in ("out", "road"))
+    assert (free[:, 22:] > 0.0).any() and not (held[:, 20:] > 0.0).any() and (held[:, 10:19] > 0.0).any()
+    report = json.loads((folder / "road" / "report.json").read_text())
+    assert "cells that no fire enters" in report["inputs"]["barriers"]
+    assert report["gigabytes"]["most"] >= report["gigabytes"]["program"] > 0.05 and report["at_once"] == 2
+
+
+TIMES = {
+    "ignition.path must have a time for each mark or for none": "row,column,time\n20,10,2024-07-01 12:10\n21,10,\n",
+    "the time of an ignition must be a date and time": "row,column,time\n20,10,noon\n",
+    "ignition.path must have a number of 0 or more for hour": "row,column,hour\n20,10,-1\n",
+    "ignition must not be before the weather's first row": "row,column,time\n20,10,2024-07-01 11:50\n",
+    "start must not be after the earliest ignition, 30 minutes": "row,column,minute\n20,10,30\n",
+}
+
+
+@pytest.mark.parametrize("line", TIMES)
+def test_a_time_that_cannot_be_is_told_in_one_line(line, folder, capsys):
+    (folder / "ignition.csv").write_text(TIMES[line])
+    late = {"start": 45} if "start" in line else {}
+    assert main(arguments(folder, **late)) == 2
+    assert line in capsys.readouterr().err.strip().splitlines()[-1]
+
+
 MISTAKES = {
+    "barrier_width is read with barriers=FILE": {"barrier_width": 10},
     "hous is not a key of the configuration: did you mean hours?": {"hous": 3},
     "fire.cell_deviaton is not a key": {"fire.cell_deviaton": 0.2},
     "fires must be a whole number": {"fires": "many"},

@@ -131,7 +131,7 @@ def test_fires_repeat_by_their_seed_and_differ_without_it():
 
 def test_how_many_burn_at_once_changes_nothing(monkeypatch):
     whole = run(270.0, fire=UNEVEN, fires=5)
-    monkeypatch.setattr(alone, "_AT_ONCE", 2)
+    monkeypatch.setattr(alone, "AT_ONCE", 2)
     parts = run(270.0, fire=UNEVEN, fires=5)
     for name in ("burn_probability", "arrival_minutes", "half_minutes", "area", "progress"):
         assert torch.equal(getattr(whole, name).nan_to_num(), getattr(parts, name).nan_to_num()), name

@@ -40,6 +40,7 @@ def test_of_many_hours_the_page_shows_some_and_the_last(prediction):
         "title": "a",
         "version": "0",
         "seconds": {"all": 1.0, "fires": 0.5},
+        "gigabytes": {"most": 0.5, "program": 0.4, "map": 0.01},
         "warnings": [],
         "inputs": {},
         "files": [],

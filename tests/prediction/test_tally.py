@@ -98,6 +98,15 @@ def test_windows_of_different_fires_make_one_map():
     assert tally.joined("final").tolist() == [0.25, 0.25]
 
 
+def test_fires_that_burn_in_another_order_are_told_in_their_own():
+    tally, count = Tally(3, 120.0, torch.tensor([2, 0, 1])), counter()
+    for minutes in ((30.0,), (60.0, 90.0)):  # fire 2, then fires 0 and 1
+        tally.add(count(burned(*({(2, 2): 0.0, (3, 3): each} for each in minutes))))
+    assert tally.every()[:, 3, 3].tolist() == pytest.approx([60.0, 90.0, 30.0], abs=2e-3)
+    assert float(tally.first[3, 3]) == 60.0 and tally.at_once == 2
+    assert tally.joined("area")[:, 1].tolist() == [0.5, 0.25, 0.5]
+
+
 def test_times_of_many_fires_that_memory_does_not_hold_are_refused(monkeypatch):
     tally, count = Tally(1000, 120.0), counter()(burned({(2, 2): 0.0}))
     monkeypatch.setattr(memory, "available", lambda: 2 * 1000 * 48)

@@ -111,9 +111,7 @@ def _format(given: object, options: argparse.Namespace) -> str:
         raise ConfigError(f"format must be one of {', '.join(FORMATS)}, got {format}{did_you_mean(format, FORMATS)}")
     changes = options.average or options.trust is not None or options.mode is not None
     if format in FILES and (changes or options.folder is None):
-        what = (
-            "trust, mode and average make a checkpoint: export that first" if changes else "FOLDER must be given"
-        )
+        what = "trust, mode and average make a checkpoint: export that first" if changes else "FOLDER must be given"
         raise ConfigError(f"{what}, then with format={format}" if changes else f"{what} with format={format}")
     check_format(format)
     return format

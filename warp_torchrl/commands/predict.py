@@ -43,7 +43,7 @@ from warp_torchrl.runs.config.construction import ConfigError, build, construct
 from warp_torchrl.runs.config.grammar import check_flags
 from warp_torchrl.runs.config.options import PredictionOptions
 from warp_torchrl.runs.output import output_folder
-from warp_torchrl.system import disk
+from warp_torchrl.system import disk, memory
 from warp_torchrl.system.provenance import Provenance, gathered
 from warp_torchrl.world.air.folder import times_of
 from warp_torchrl.world.air.weather import Weather
@@ -89,7 +89,7 @@ def composed(overrides: Sequence[str]) -> dict[str, Any]:
 
 
 def _run(arguments: Sequence[str]) -> None:
-    began = time.perf_counter()
+    began, program = time.perf_counter(), memory.most_used()
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     values = composed(arguments)
     options: PredictionOptions = construct(
@@ -106,6 +106,7 @@ def _run(arguments: Sequence[str]) -> None:
         seconds = {"fires": time.perf_counter() - fires_began, "all": time.perf_counter() - began}
         report = _report(prediction, case, values, files, seconds)
         _write(draft, prediction, case, options, report["title"])
+        report["gigabytes"] = {"most": memory.most_used() / 1e9, "program": program / 1e9, "map": _bytes(case) / 1e9}
         text = page(report)
         if corrected is not None:
             report["observed"] = observed_numbers(corrected, case.cell_size)
@@ -215,6 +216,7 @@ def _burn(case: Case, options: PredictionOptions, corrected: Corrected | None) -
             members=members,
             is_seen=corrected is not None,
             embers=options.firebrands if options.embers else None,
+            later=case.later,
             keep_every=options.arrivals,
             progress=bar.update,
         )
@@ -240,7 +242,8 @@ def _report(
         "wind height": case.weather.wind_height,
         "grid convergence [degrees]": round(case.convergence, 3),
         "start [minutes after the first row]": case.start,
-        "ignition": f"{values['ignition']}, {int(prediction.lit.sum())} cells with fuel of {int(case.ignition.sum())}",
+        "ignition": f"{values['ignition']}, {int(prediction.lit.sum())} cells with fuel of {_marked(case)}",
+        **_barriers(case, values),
         "cells of fuels": case.fire.told_fuel(case.ground),
         **dict(each.split(": ", 1) for each in case.files),
         "law": without_targets(values["fire"]),
@@ -255,6 +258,23 @@ def _report(
         "configuration": without_targets(values),
         "seconds": seconds,
     }
+
+
+def _bytes(case: Case) -> int:
+    """Return the bytes of the map's layers."""
+    return sum(leaf.numel() * leaf.element_size() for leaf in case.ground.leaves().values())
+
+
+def _marked(case: Case) -> int:
+    """Return how many cells the ignition marks."""
+    return int((case.ignition if case.later is None else case.ignition | case.later.isfinite()).sum())
+
+
+def _barriers(case: Case, values: Mapping[str, Any]) -> dict[str, str]:
+    """Return what is read of barriers; nothing where there are none."""
+    if case.closed is None:
+        return {}
+    return {"barriers": f"{values['barriers']}, {int(case.closed.sum())} cells that no fire enters"}
 
 
 def _write(folder: Path, prediction: Prediction, case: Case, options: PredictionOptions, title: str) -> None:

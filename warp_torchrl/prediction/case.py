@@ -13,9 +13,10 @@ from warp_torchrl.runs.config.options import PredictionOptions
 from warp_torchrl.world.air.fields import WeatherFields
 from warp_torchrl.world.air.folder import rasters_of, read_folder, times_of
 from warp_torchrl.world.arrays.random import world_key
-from warp_torchrl.world.ignition.file import read_ignition
+from warp_torchrl.world.ignition.file import read_ignition, read_ignition_times
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state.state import Landscape
+from warp_torchrl.world.terrain.barriers import read_barriers
 from warp_torchrl.world.terrain.geotiff import local_grid
 from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.raster import Raster
@@ -23,6 +24,7 @@ from warp_torchrl.world.terrain.source import LandscapeSource
 from warp_torchrl.world.weather.convergence import grid_convergence
 from warp_torchrl.world.weather.table import WeatherTable, minutes_until, read_weather
 
+_MINUTE = 1e-3  # by which two times may be off for rounding [minutes]
 _NEAR = 0.005  # share by which a cell's side may be off
 
 
@@ -37,7 +39,9 @@ class Case:
     weather: WeatherTable
     start: float  # since the weather's first row began [minutes]
     convergence: float  # angle from true north to grid north [degrees]
-    ignition: Tensor  # bool [H, W]
+    ignition: Tensor  # what burns at the start, bool [H, W]
+    later: Tensor | None = None  # when further cells are lit since the start [minutes], float32 [H, W], else infinite
+    closed: Tensor | None = None  # cells of barriers, bool [H, W]
     fields: WeatherFields | None = None  # the weather by place
     files: Sequence[str] = ()  # what is read of each file of the map, and what is left
 
@@ -60,19 +64,50 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
     rows, columns = slice(corner[0], corner[0] + height), slice(corner[1], corner[1] + width)
     convergence = _convergence(place, (height, width)) if options.true_north else 0.0
     weather, by_place = _weather(options, place, (height, width), convergence)
-    times = times_of(str(options.weather))
+    start, lit, later = _started(options, place.grid, lit)
+    closed = None
+    if options.barriers is not None:
+        closed = torch.as_tensor(read_barriers(options.barriers, place.grid, options.barrier_width))[rows, columns]
+        ground = replace(ground, age=ground.age * ~closed)  # nothing grows there
     return Case(
         ground=options.hills.shaped(ground, cell_size) if options.wind == "terrain" else ground,
         place=place,
         cell_size=cell_size,
         fire=fire,
         weather=weather,
-        start=minutes_until(options.start, times, options.units) if isinstance(options.start, str) else options.start,
+        start=start,
         convergence=convergence,
         ignition=lit[rows, columns],
+        later=None if later is None else later[rows, columns],
+        closed=closed,
         files=_files(source, str(options.ignition), *rasters_of(str(options.weather))),
         fields=by_place,
     )
+
+
+def _started(options: PredictionOptions, grid: Grid, lit: Tensor) -> tuple[float, Tensor, Tensor | None]:
+    """Return the start [minutes after the weather's first row], what burns then, and when more is lit since then."""
+    weather = times_of(str(options.weather))
+
+    def moment(text: str, name: str = "the time of an ignition") -> float:
+        return minutes_until(text, weather, options.units, name)
+
+    start = moment(options.start, "start") if isinstance(options.start, str) else options.start
+    found = read_ignition_times(str(options.ignition), grid, moment)
+    if found is None:
+        return start or 0.0, lit, None
+    if options.observed is not None:
+        raise ValueError("ignition must have no times where observed is given, which tells what had burned by then")
+    times = torch.as_tensor(found)
+    earliest = round(float(times.min()), 3)
+    if earliest < 0.0:
+        raise ValueError(f"ignition must not be before the weather's first row, got {-earliest:g} minutes before it")
+    start = earliest if start is None else start
+    if start > earliest + _MINUTE:
+        first = f"the earliest ignition, {earliest:g} minutes after the weather's first row"
+        raise ValueError(f"start must not be after {first}, got {start:g}; null starts with it")
+    since = times - start
+    return start, since <= _MINUTE, torch.where(since > _MINUTE, since, torch.inf)
 
 
 def _weather(

@@ -1,7 +1,7 @@
 """The maps of a prediction as files: GeoTIFF, GeoJSON, PNG and GIF."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,22 +35,23 @@ class MapPlace:
     corner: tuple[int, int] = (0, 0)  # (row, column) of the first cell in the grid
 
 
-def layers(prediction: Prediction) -> dict[str, dict[str, Tensor]]:
-    """Return the bands of each GeoTIFF by the file's name; times in hours."""
-    crowns = {name: getattr(prediction, name) for name in CROWN_MAPS} if prediction.has_crowns else {}
-    return {
-        "burn_probability": {"burn_probability": prediction.burn_probability},
-        "arrival_hours": {
+def layers(prediction: Prediction) -> Iterator[tuple[str, dict[str, Tensor]]]:
+    """Yield each GeoTIFF's name and its bands, one after the other; times in hours."""
+    yield "burn_probability", {"burn_probability": prediction.burn_probability}
+    yield (
+        "arrival_hours",
+        {
             "median": prediction.arrival_minutes / 60.0,
             "early_10": prediction.arrival_early / 60.0,
             "late_90": prediction.arrival_late / 60.0,
             "half": prediction.half_minutes / 60.0,
         },
-        "rate": {"rate_m_min": prediction.rate},
-        "intensity": {"intensity_kw_m": prediction.intensity},
-        "flame_length": {"flame_length_m": prediction.flame_length},
-        **({"crown": crowns} if crowns else {}),
-    }
+    )
+    yield "rate", {"rate_m_min": prediction.rate}
+    yield "intensity", {"intensity_kw_m": prediction.intensity}
+    yield "flame_length", {"flame_length_m": prediction.flame_length}
+    if prediction.has_crowns:
+        yield "crown", {name: getattr(prediction, name) for name in CROWN_MAPS}
 
 
 def write_layers(folder: Path, prediction: Prediction, place: MapPlace) -> list[str]:
@@ -60,10 +61,11 @@ def write_layers(folder: Path, prediction: Prediction, place: MapPlace) -> list[
         ValueError: If rasterio is not installed.
         OSError: If a write fails, with the path.
     """
-    bands = {f"{name}.tif": each for name, each in layers(prediction).items()}
-    for name, each in bands.items():
-        write_geotiff(folder / name, each, place.grid, place.corner, _UNITS[name.removesuffix(".tif")])
-    return list(bands)
+    names = []
+    for name, bands in layers(prediction):
+        write_geotiff(folder / f"{name}.tif", bands, place.grid, place.corner, _UNITS[name])
+        names.append(f"{name}.tif")
+    return names
 
 
 def write_arrivals(path: Path, prediction: Prediction, place: MapPlace) -> None:

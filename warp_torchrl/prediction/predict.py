@@ -42,9 +42,10 @@ class Prediction:
     left_map: Tensor  # whether a fire came to the map's edge, bool [B]
     followed: Tensor  # how long each fire was followed, float32 [B] [min]
     head_rate: Tensor  # highest in each spell that a fire met, of all cells but one in a thousand [m/min]
-    lit: Tensor  # where fires started, bool [H, W]
+    lit: Tensor  # where fires were lit, at the start or later, bool [H, W]
     ground: Landscape  # batch size [1]
     cell_size: float  # side of a cell [m]
+    at_once: int = 1  # most fires that burned together
     every: Tensor | None = None  # when each fire came, float32 [B, h, w] [min], NaN where it did not; where kept
 
     @property
@@ -138,6 +139,7 @@ def predict(
     members: Members | None = None,
     is_seen: bool = False,
     embers: Firebrands | None = None,
+    later: Tensor | None = None,
     keep_every: bool = False,
     progress: Callable[[int], object] | None = None,
 ) -> Prediction:
@@ -163,6 +165,8 @@ def predict(
         is_seen: Whether the ignition is what a fire had burned when it was seen: its front is on average half a cell
             ahead then.
         embers: Firebrands that start fires ahead; None: none fly.
+        later: When further cells are lit, float32 [H, W] in minutes since the start, infinite where they are not;
+            None: none are.
         keep_every: Whether the prediction keeps the arrival times of every fire.
         progress: Called with how many fires have been burned since the last call.
 
@@ -182,24 +186,27 @@ def predict(
     met = spells_of(Weather(table=table, convergence=convergence, fields=fields), minutes, start)
     front = beside(ignition.cpu()) if is_seen else None
     who = Members.plain(fires) if members is None else members
-    burning = who.fires(law, ground, met, cell_size, front, embers)
+    order = who.by_pace()
+    burning = who.part(order).fires(law, ground, met, cell_size, front, embers, in_paces=True, later=later)
     lit = ignition.cpu() & burning.fuel
-    if not bool(lit.any()):
-        raise ValueError(f"ignition must light a cell with fuel, none of its {int(ignition.sum())} cells has any")
-    count = Counter(fires=burning, lit=lit, minutes=minutes, area=area)
-    tally = Tally(fires, minutes)
-    tally.check(Window.about(lit))
-    for part in burning.in_parts(lit, world_key(seed + torch.arange(fires)), count, count.most_cells):
+    every = lit if later is None else lit | (burning.fuel & (later <= minutes))
+    if not bool(every.any()):
+        given = int(ignition.sum()) if later is None else int((ignition | later.isfinite()).sum())
+        raise ValueError(f"ignition must light a cell with fuel, none of its {given} cells has any")
+    count = Counter(fires=burning, lit=lit if bool(lit.any()) else every, minutes=minutes, area=area)
+    tally = Tally(fires, minutes, order)
+    tally.check(Window.about(count.lit))
+    for part in burning.in_parts(lit, world_key(seed + order), count, count.most_cells):
         tally.add(part)
         if progress is not None:
             progress(len(part.left))
-    return _prediction(tally, count, keep_every)
+    return _prediction(tally, count, every, keep_every)
 
 
-def _prediction(tally: Tally, count: Counter, keep_every: bool) -> Prediction:
+def _prediction(tally: Tally, count: Counter, ever_lit: Tensor, keep_every: bool) -> Prediction:
     times, (rate, intensity, flame_length, *crowns) = tally.arrivals(), tally.means()
     window, fires = tally.window.on_map, count.fires
-    lit = tally.window.cut(count.lit, False)
+    lit = tally.window.cut(ever_lit, False)
     maps = {
         "burn_probability": tally.burn_probability(),
         "arrival_minutes": times.median,
@@ -222,9 +229,10 @@ def _prediction(tally: Tally, count: Counter, keep_every: bool) -> Prediction:
         left_map=tally.joined("left"),
         followed=tally.joined("followed"),
         head_rate=torch.tensor([fires.fastest(number)[1] for number in range(fires.n_met)]),
-        lit=count.lit,
+        lit=ever_lit,
         ground=fires.landscape,
         cell_size=fires.cell_size,
+        at_once=tally.at_once,
         every=tally.every()[:, :, : window.width] if keep_every else None,
     )
 

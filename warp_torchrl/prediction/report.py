@@ -26,6 +26,7 @@ def report_numbers(prediction: Prediction) -> dict[str, Any]:
     rates = {name: _highest(getattr(prediction, name)) for name in ("rate", "intensity", "flame_length")}
     return {
         "fires": len(prediction.followed),
+        "at_once": prediction.at_once,
         "followed_minutes": _spread(prediction.followed),
         "area_ha": _spread(prediction.final_area),
         "left_map": float(prediction.left_map.to(torch.float32).mean()),
@@ -37,12 +38,14 @@ def report_numbers(prediction: Prediction) -> dict[str, Any]:
 
 def page(found: Mapping[str, Any]) -> str:
     """Return the report as Markdown, from ``report.json``'s content."""
-    area, highest = found["area_ha"], found["highest"]
+    area, highest, held = found["area_ha"], found["highest"], found["gigabytes"]
     lines = [
         f"# {found['title']}",
         "",
         f"{found['fires']} fires of {_hours(found['followed_minutes'])}, warp_torchrl {found['version']}, "
         f"{found['seconds']['all']:.1f} s in all, {found['seconds']['fires']:.1f} s of it the fires.",
+        f"Up to {found['at_once']} fires at a time; memory {held['most']:.2f} GB at most, of it the program "
+        f"{held['program']:.2f} GB, the map's layers {held['map']:.2f} GB.",
         "",
         f"- area burned: {area['median']:,.0f} ha (5 % to 95 %: {area['low']:,.0f} to {area['high']:,.0f} ha)",
         f"- came to the map's edge: {found['left_map']:.0%} of the fires",

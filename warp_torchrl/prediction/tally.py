@@ -1,6 +1,7 @@
 """Sums over many fires on one map, some fires at a time."""
 
 from dataclasses import dataclass
+from itertools import accumulate
 
 import torch
 from torch import Tensor
@@ -30,10 +31,13 @@ class Tally:
     Args:
         fires: How many there will be.
         minutes: How long fires are followed.
+        order: The number of each fire, in the order in which they are added, int64 [B]; None: 0, 1, 2 ... The fire of
+            number 0 must be the first of its part.
     """
 
-    def __init__(self, fires: int, minutes: float) -> None:
+    def __init__(self, fires: int, minutes: float, order: Tensor | None = None) -> None:
         self._fires, self._minutes = fires, minutes
+        self._place = torch.arange(fires) if order is None else order.argsort()  # of each fire, as they are added
         self._counts: list[Count] = []
         self._window: Window | None = None
         self._came, self._sums = torch.zeros(0, 0), torch.zeros(0, 0, 0)
@@ -59,16 +63,22 @@ class Tally:
         return self._window
 
     @property
+    def at_once(self) -> int:
+        """Return the most fires of one part."""
+        return max(len(count.left) for count in self._counts)
+
+    @property
     def first(self) -> Tensor:
         """Return when the first fire came, float32 [h, w] [minutes]; NaN where it did not."""
         plane = torch.full(self._came.shape, torch.nan)
-        count = self._counts[0]
+        begins = [0, *accumulate(len(count.left) for count in self._counts)]
+        count = self._counts[begins.index(int(self._place[0]))]
         plane[count.window.place_in(self.window)] = torch.where(count.first < NEVER / 2, count.first, torch.nan)
         return plane
 
     def joined(self, name: str) -> Tensor:
         """Return ``area`` [B, T] and ``final`` area [B] [ha], ``progress`` [B, T] [m], ``left`` or ``followed`` [B]."""
-        return torch.cat([getattr(count, name) for count in self._counts])
+        return torch.cat([getattr(count, name) for count in self._counts])[self._place]
 
     def burn_probability(self) -> Tensor:
         """Return the share of the fires that reached each cell, float32 [h, w]."""
@@ -82,6 +92,7 @@ class Tally:
         """Return when each fire came, float32 [B, h, w] [minutes]; NaN where it did not."""
         block = slice(0, self.window.height), slice(0, self.window.width)
         times = torch.cat([self._times(count, block) for count in self._counts])
+        times = times[self._place]
         minutes = (times.to(torch.float32) + TIME_STEPS // 2) * (self._minutes / TIME_STEPS)
         return torch.where(times < LATE, minutes, torch.nan)
 

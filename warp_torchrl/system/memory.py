@@ -2,6 +2,7 @@
 
 import os
 import resource
+import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -18,6 +19,14 @@ _FILES = ("inactive_file ", "total_inactive_file ")
 def available() -> int:
     """Return the bytes that this process may still use: the least of the machine's, container's and own limits."""
     return max(0, min(_limits()))
+
+
+def most_used() -> int:
+    """Return the most bytes of memory that this process has had at once since it began."""
+    with suppress(OSError, ValueError, IndexError, StopIteration):  # of this program alone, not of what started it
+        lines = Path("/proc/self/status").read_text().splitlines()
+        return 1024 * int(next(line for line in lines if line.startswith("VmHWM:")).split()[1])
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
 def too_little(what: str, wanted: float, there: float) -> ValueError:

@@ -140,7 +140,7 @@ def test_too_many_fires_for_their_window_go_on_in_parts(monkeypatch):
 
 
 def test_threads_change_nothing_and_end_with_an_error(monkeypatch):
-    monkeypatch.setattr(alone, "_AT_ONCE", 1)
+    monkeypatch.setattr(alone, "AT_ONCE", 1)
     (fires, cells), key = started(weather=2), world_key(torch.arange(2))
     one, two = (list(replace(fires, workers=workers).in_parts(cells, key, alone.on_map)) for workers in (1, 2))
     assert len(two) == 2 and torch.equal(torch.cat(one), torch.cat(two))

@@ -10,6 +10,7 @@ from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.behaviour.moistures import MOISTURES, moisture_row
 from warp_torchrl.world.ensemble.parameters import Deviations
 from warp_torchrl.world.fires import alone
+from warp_torchrl.world.fires import members as members_module
 from warp_torchrl.world.fires.alone import on_map
 from warp_torchrl.world.fires.members import Members
 from warp_torchrl.world.fires.sectors import SECTORS
@@ -67,7 +68,7 @@ def test_members_burn_as_each_does_alone(at_once, monkeypatch):
     ground, cells, key = land(1, size), lit(size, (20, 30)), world_key(torch.arange(4))
     members = Members(torch.tensor([member(), member(0.7), member(1.5, 1.3, 40.0), member(1.0, 0.6, -30.0, 1.4)]))
     fires = members.fires(fire, ground, turning(2, minutes=8.0), 30.0)
-    monkeypatch.setattr(alone, "_AT_ONCE", at_once)
+    monkeypatch.setattr(alone, "AT_ONCE", at_once)
     together = torch.cat(list(fires.in_parts(cells, key, on_map)))
     for one in range(4):
         single = on_map(fires.of(slice(one, one + 1)).burn(cells, key[one : one + 1]))[0]
@@ -121,3 +122,20 @@ def test_members_that_differ_in_rate_alone_have_one_factor_in_each_part_of_its_d
     assert rates[50] == pytest.approx(1.0, abs=1e-6) and not bool(members.values[:, 1:].any())
     assert float(rates.std() / rates.mean()) == pytest.approx(0.4, abs=0.02)
     assert not torch.equal(members.rate, rates), "keys order them"
+
+
+def test_members_of_like_rates_burn_in_ticks_of_their_own(monkeypatch):
+    monkeypatch.setattr(members_module, "AT_ONCE", 2)
+    members = Members(torch.tensor([member(1.2), member(0.5), member(3.0), member(0.6)]))
+    order = members.by_pace()
+    assert order.tolist() == [1, 3, 0, 2], "slow ones, then swift ones, each in their order"
+    sorted_members = members.part(order)
+    size, fire = (41, 64), RateFire(model="fbp", cell_deviation=0.2)
+    fires = sorted_members.fires(fire, land(1, size), turning(2, minutes=8.0), 30.0, in_paces=True)
+    assert fires.swift.tolist() == pytest.approx([0.6, 0.6, 3.0, 3.0])
+    cells, key = lit(size, (20, 30)), world_key(order)
+    parts = list(fires.in_parts(cells, key, on_map))
+    assert [len(part) for part in parts] == [2, 2]
+    assert fires.of(slice(0, 2)).spell(0).ticks < fires.of(slice(2, 4)).spell(0).ticks
+    monkeypatch.setattr(alone, "AT_ONCE", 1)
+    assert torch.equal(torch.cat(list(fires.in_parts(cells, key, on_map))), torch.cat(parts))

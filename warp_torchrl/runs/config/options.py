@@ -89,12 +89,17 @@ class PredictionOptions:
     Attributes:
         weather: CSV file of hourly weather, see ``warp_torchrl.world.weather.table``; or a folder of rasters with a
             band an hour, see ``warp_torchrl.world.air.folder``.
-        ignition: File of the ignition: points, a raster or a perimeter.
+        ignition: File of the ignition: points, a raster or a perimeter; points and shapes may have times, and burn from
+            then on.
+        barriers: File of roads, rivers and dozer lines that no flame crosses: GeoJSON or a shapefile of lines or
+            polygons.
+        barrier_width: Width of the lines [m], where they are wider than a cell.
         hours: Time for which fires are followed [h]; None: to the end of the weather.
         area: Area at which a fire stops, even before [ha]; None for no limit.
         fires: Number of fires.
         seed: Fire i has seed ``seed + i``.
-        start: Start of the fires: minutes since the weather's first row, or a date and time.
+        start: Start of the fires: minutes since the weather's first row, or a date and time; None: that of the earliest
+            ignition with a time, else of the first row.
         perimeter_hours: Hours between the perimeters that are written.
         wind_height: Height at which the wind was measured; None takes the file's.
         units: Unit of a quantity or column of the weather where the file states none, ``units.wind_speed=km/h``; of
@@ -132,11 +137,13 @@ class PredictionOptions:
 
     weather: str | None = None
     ignition: str | None = None
+    barriers: str | None = None
+    barrier_width: float = 0.0
     hours: float | None = None
     area: float | None = None
     fires: int = 100
     seed: int = 0
-    start: float | str = 0.0
+    start: float | str | None = None
     perimeter_hours: float = 1.0
     wind_height: Literal["10m", "20ft"] | None = None
     units: Mapping[str, str] = field(default_factory=dict)
@@ -167,6 +174,7 @@ class PredictionOptions:
             fires=(1, 1_000_000),
             seed=(0, 2**62),
             perimeter_hours=(1e-2, 1e5),
+            barrier_width=(0.0, 1e5),
             start_ffmc=(0.0, 101.0),
             bui=(0.0, 2000.0),
             cell_size=(0.01, 100_000.0),
@@ -175,6 +183,8 @@ class PredictionOptions:
         for name, what in (("weather", "a CSV file of weather"), ("ignition", "a file of where the fire starts")):
             if getattr(self, name) is None:
                 raise ValueError(f"{name} must name {what}, got null")
+        if self.barrier_width and self.barriers is None:
+            raise ValueError(f"barrier_width is read with barriers=FILE, got {self.barrier_width:g} and no file")
         if self.firebrands != Firebrands() and not self.embers:
             raise ValueError("firebrands is read with embers=true, got embers=false")
         read = {"rate": Deviations(rate=self.members.rate), "all": self.members, "none": Deviations()}

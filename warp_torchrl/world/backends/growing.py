@@ -85,6 +85,7 @@ class GrowingFires(Spreading):
         land: The map.
         most: Cells that each fire burns before it stops; None lets it go on.
         check: Is told each new window before anything is made for it, and may refuse it by an exception.
+        about: The cells about which the first window lies, bool [H, W], one at least; None: those that are lit.
     """
 
     def __init__(
@@ -94,8 +95,9 @@ class GrowingFires(Spreading):
         land: Land,
         most: int | None = None,
         check: Callable[[Window], None] = lambda window: None,
+        about: Tensor | None = None,
     ) -> None:
-        self.window = Window.about(lit)
+        self.window = Window.about(lit if about is None else about)
         self._land, self._most, self._check = land, most, check
         check(self.window)
         self._rim: tuple[Tensor, ...] | None = None

@@ -1,6 +1,5 @@
 """Fires without vehicles under law ``rate``: many on one map, in hourly weather, from ignition to an end."""
 
-import math
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,18 +12,21 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.system import memory
-from warp_torchrl.world.backends.growing import GrowingFires, Land, SpellInWindows
-from warp_torchrl.world.backends.spells import Highest, PlanesOfSpells, in_window, on_strips
+from warp_torchrl.world.backends.growing import Embers, GrowingFires, Land, SpellInWindows
+from warp_torchrl.world.backends.spells import PlanesOfSpells, in_window, strips
 from warp_torchrl.world.backends.spreading import Hour
 from warp_torchrl.world.behaviour.firebrands import Firebrands
-from warp_torchrl.world.fires.spell import BUT_FASTEST, Spell, air_in, can_ignite, heads, spread_in, ticks_of
+from warp_torchrl.world.fires.fastest import RowsOfMap, fastest_heads, heads_of_strips
+from warp_torchrl.world.fires.later import LaterFires
+from warp_torchrl.world.fires.spell import Spell, air_in, can_ignite, heads, spread_in, ticks_of
 from warp_torchrl.world.fires.spotting import EmberGround, SpotFires
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER, travel
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.state.window import Window
 
-_AT_ONCE = 64  # fires, whose planes a CPU's cache holds
+AT_ONCE = 64
+"""Fires that burn at once at most, whose planes a CPU's cache holds."""
 _MOST_CELLS = 2**24  # of the windows of fires that burn at once
 _BYTES_A_FIRE, _BYTES_A_CELL = 64, 200  # that a cell of a window takes at most, for each fire and for the map
 _BYTES_OF_GROUP = 96  # that a cell takes for the planes of each group
@@ -60,9 +62,12 @@ class Fires:
         rate: Factor on the rates of each fire, float32 [B], or in each of S sectors, float32 [B, S]; None is 1.
         sector: The sector of each cell, int64 [H, W].
         swiftest: Highest of these factors; it shortens ticks.
+        swift: Highest of the factors of the fires that each burns with, float32 [B], equal ones side by side, so that
+            slow fires do not take the ticks of the swiftest one. None: all take ``swiftest``.
         half_way: Cells that the fire has come half-way to at the start, bool [H, W]: those about a perimeter, whose
             front is half a cell ahead of the last cell inside, on average; None where it starts in its cells' middle.
         embers: Firebrands that start fires ahead; None: none fly.
+        later: When further cells are lit, float32 [H, W] [minutes], infinite where they are not; None: none are.
         root: All fires, where these are some of them (``of``).
         workers: Threads.
     """
@@ -75,8 +80,10 @@ class Fires:
     rate: Tensor | None = None
     sector: Tensor | None = None
     swiftest: float = 1.0
+    swift: Tensor | None = None
     half_way: Tensor | None = None
     embers: Firebrands | None = None
+    later: Tensor | None = None
     root: "Fires | None" = field(default=None, repr=False)
     workers: int = field(default_factory=torch.get_num_threads)
     _lock: threading.Lock = field(init=False, repr=False, default_factory=threading.Lock)
@@ -123,6 +130,8 @@ class Fires:
         Returns:
             float32 [G, 7, h, w], or 8 where fires run in crowns; the heads as in ``passing.HeadBehaviour``.
         """
+        if self.root is not None and self.root.groups == 1:
+            return self.root.planes(number, window)
         made = self._made(number, window)
         return made.view(-1, 8 if self.runs_in_crowns else 7, *made.shape[1:])
 
@@ -161,7 +170,10 @@ class Fires:
         spells = [spell.of(fires) for spell in self.spells]
         if self.groups == 1 and rate is None:
             return self
-        return replace(self, fire=laws[0], beside=laws[1:], spells=spells, rate=rate, root=self.root or self)
+        swiftest = self.swiftest if self.swift is None else float(self.swift[fires.start])
+        return replace(
+            self, fire=laws[0], beside=laws[1:], spells=spells, rate=rate, swiftest=swiftest, root=self.root or self
+        )
 
     def burn(self, lit: Tensor, key: Tensor, most: int | None = None) -> Burned:
         """Burn some fires at once, to the end of the weather.
@@ -175,8 +187,15 @@ class Fires:
             ValueError: If their window does not fit in memory.
         """
         land = Land(lambda window: window.cut(self.fuel, False), lambda window: self.pace(key, window))
-        fires = GrowingFires(lit, len(key), land, most, partial(self._check, len(key)))
-        embers = None if self.embers is None else SpotFires(self.embers, self._ember_ground(), key)
+        embers: Embers | None = None
+        if self.embers is not None:
+            embers = SpotFires(self.embers, self._ember_ground(), key)
+        about = lit
+        if self.later is not None:
+            later = torch.where(self.fuel, self.later, torch.inf)
+            embers = LaterFires(later, len(key), embers)
+            about = lit if bool(lit.any()) else later.isfinite()
+        fires = GrowingFires(lit, len(key), land, most, partial(self._check, len(key)), about)
         fires.burn_spells((self._going(number) for number in range(len(self.spells))), embers)
         return Burned(fires.window, fires.arrival(), self.pace(key, fires.window), self)
 
@@ -192,7 +211,7 @@ class Fires:
         Raises:
             ValueError: If the window of one fire does not fit in memory.
         """
-        limit, each = [_AT_ONCE], max(1, len(key) // len(self.laws))
+        limit, each = [AT_ONCE], max(1, len(key) // len(self.laws))
 
         def burned(part: slice) -> list[T]:
             count = part.stop - part.start
@@ -207,13 +226,15 @@ class Fires:
 
         def parts(whole: slice, size: int) -> Iterator[slice]:
             """Yield parts of whole laws where some fit, else of one law each."""
+            if self.swift is not None:
+                return (less for like in _alike(self.swift, whole) for less in _parts(like, size))
             if size >= each or not self.beside:
                 return _parts(whole, size - size % each if self.beside else size)
             return (less for law in _parts(whole, each) for less in _parts(law, size))
 
         self._ended.clear()
         workers = 1 if lit.is_cuda else self.workers
-        for found in _side_by_side(burned, parts(slice(0, len(key)), _AT_ONCE), workers, self._ended):
+        for found in _side_by_side(burned, parts(slice(0, len(key)), AT_ONCE), workers, self._ended):
             yield from found
 
     def pace(self, key: Tensor, window: Window) -> Tensor:
@@ -275,23 +296,24 @@ class Fires:
             made.append(torch.cat((times, heads(spread, self.runs_in_crowns)), dim=1))
         return (made[0] if len(made) == 1 else torch.cat(made)).flatten(0, 1)
 
-    def _head(self, number: int, law: RateFire, strip: Window) -> Tensor:
-        if strip.is_whole and self.groups == 1:
-            return self.planes(number, strip)[0, _HEAD]
-        spell = self.spells[number].fastest or self.spells[number]
-        return spread_in(law, self.landscape, self.cell_size, spell, strip).head[0]
-
     def _fastest_of(self, number: int) -> tuple[float, float]:
-        return tuple(map(max, zip(*(self._fastest_by(law, number) for law in self.laws), strict=True)))  # type: ignore[return-value]
+        low, high = zip(*(self._fastest_by(law, number) for law in self.laws), strict=True)
+        return max(low), max(high)
 
     def _fastest_by(self, law: RateFire, number: int) -> tuple[float, float]:
-        n_fuel, n_cells = int(self.fuel.sum()), self.fuel.numel()
-        of_fuel = Highest(n_fuel - max(1, math.ceil(BUT_FASTEST * n_fuel)) + 1)
-        of_all = Highest(n_cells - max(1, round(BUT_FASTEST * n_cells)) + 1)
-        for strip, head in on_strips(partial(self._head, number, law), self.size, self.workers):
-            of_fuel.add(head[strip.cut(self.fuel, False)])
-            of_all.add(head.flatten())
-        return of_fuel.least if n_fuel else 0.0, of_all.least
+        spell, rows = self.spells[number].fastest or self.spells[number], self._rows
+        if rows is not None:
+            fuel, heads = rows.fuel, iter([(rows.head(law, spell, self.cell_size), rows.fuel)])
+        elif self.groups == 1 and next(strips(self.size)).is_whole:
+            fuel, heads = self.fuel, iter([(self.planes(number, Window.whole(self.size))[0, _HEAD], self.fuel)])
+        else:
+            fuel = self.fuel
+            heads = heads_of_strips(law, self.landscape, self.cell_size, spell, fuel, self.workers)
+        return fastest_heads(heads, int(fuel.sum()), fuel.numel())
+
+    @cached_property
+    def _rows(self) -> RowsOfMap | None:
+        return RowsOfMap.of(self.landscape, self.fuel, self.cell_size)
 
 
 def arrival_minutes(
@@ -339,6 +361,14 @@ def _parts(whole: slice, size: int) -> Iterator[slice]:
     """Yield ``size`` fires at a time."""
     begins = range(whole.start, whole.stop, size)
     yield from (slice(begin, min(begin + size, whole.stop)) for begin in begins)
+
+
+def _alike(swift: Tensor, whole: slice) -> Iterator[slice]:
+    """Yield the runs of fires that take the same ticks."""
+    begin = whole.start
+    for count in swift[whole].unique_consecutive(return_counts=True)[1].tolist():
+        yield slice(begin, begin + count)
+        begin += count
 
 
 def _side_by_side(

@@ -11,7 +11,7 @@ from warp_torchrl.world.arrays.random import Stream, log_deviation, normal, unif
 from warp_torchrl.world.behaviour.firebrands import Firebrands
 from warp_torchrl.world.behaviour.moistures import MOISTURES, in_force, moisture_row
 from warp_torchrl.world.ensemble.parameters import PARAMETERS, Deviations
-from warp_torchrl.world.fires.alone import Fires
+from warp_torchrl.world.fires.alone import AT_ONCE, Fires
 from warp_torchrl.world.fires.sectors import SECTORS, STOPPED, sectors_about
 from warp_torchrl.world.fires.spell import Spell, can_ignite, spread_in
 from warp_torchrl.world.law.rate import RateFire
@@ -88,8 +88,23 @@ class Members:
         chance = uniform(key, tick, Stream.HELD, (SECTORS,))
         return Members(self.values, (log_deviation(local) * draws).exp(), chance < held, sector)
 
-    def part(self, members: slice) -> "Members":
-        """Return some of the members."""
+    def by_pace(self) -> Tensor:
+        """Return the order in which members of like rates stand side by side, in groups that burn at once, int64 [K].
+
+        The members of a group keep their order.
+        """
+        order = self.rate.argsort(stable=True)
+        return torch.cat([group.sort().values for group in self._groups(order)])
+
+    def _swift(self) -> Tensor:
+        """Return the highest rate in the group of each member, float32 [K], of members that stand ``by_pace``."""
+        return torch.cat([group.max().expand(len(group)) for group in self._groups(self.rate)])
+
+    def _groups(self, values: Tensor) -> tuple[Tensor, ...]:
+        return values.chunk(-(-len(values) // AT_ONCE))
+
+    def part(self, members: slice | Tensor) -> "Members":
+        """Return some of the members, or all in another order."""
         local, held = (None if each is None else each[members] for each in (self.local, self.held))
         return Members(self.values[members], local, held, self.sector)
 
@@ -136,6 +151,8 @@ class Members:
         cell_size: float,
         half_way: Tensor | None = None,
         embers: Firebrands | None = None,
+        in_paces: bool = False,
+        later: Tensor | None = None,
     ) -> Fires:
         """Return the members' fires on a map, one of each.
 
@@ -146,6 +163,8 @@ class Members:
             cell_size: Side of a cell [m].
             half_way: See ``Fires``.
             embers: See ``Fires``.
+            in_paces: Whether the members stand ``by_pace``, and each group of them takes ticks as short as it needs.
+            later: See ``Fires``.
         """
         met = spells if not bool(self.values[:, 1:].any()) else [self._spell(fire, spell) for spell in spells]
         rate = self._rates()
@@ -157,8 +176,10 @@ class Members:
             rate=rate,
             sector=self.sector,
             swiftest=max(1.0, float(self.rate.max())),
+            swift=self._swift() if in_paces and rate is not None else None,
             half_way=half_way,
             embers=embers,
+            later=later,
         )
 
     def pace(self, fire: RateFire, landscape: Landscape, spell: Spell, cell_size: float, window: Window) -> Tensor:

@@ -75,7 +75,7 @@ def spread_in(
     moistures = moisture.reshape(-1, len(row)).expand(len(winds), -1)
     ground, rise = landscape, None
     if window is not None:
-        ground, rise = window.landscape(landscape), _rise(landscape, window, cell_size)
+        ground, rise = window.landscape(landscape), rise_of(landscape, window, cell_size)
     at_once = max(1, _SPREAD_AT_ONCE // ground.cover.numel())
     place = Window.whole((landscape.cover.shape[1], landscape.cover.shape[2])) if window is None else window
     parts = [
@@ -111,7 +111,7 @@ def heads(spread: Spread, with_kind: bool = False) -> Tensor:
     return torch.stack((then.head, then.backing, then.intensity, then.flame_length, *kind), dim=1)
 
 
-def _rise(landscape: Landscape, window: Window, cell_size: float) -> Tensor:
+def rise_of(landscape: Landscape, window: Window, cell_size: float) -> Tensor:
     """Return the gradient of a window's ground, float32 [1, 2, h, w]."""
     cover = window.around(landscape.cover)
     if landscape.elevation is None:

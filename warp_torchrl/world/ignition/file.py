@@ -1,6 +1,7 @@
 """Ignition from a file: points, lines, a perimeter or a raster."""
 
 import logging
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field
 from os import PathLike
@@ -15,7 +16,7 @@ from warp_torchrl.world.arrays.geometry import grow
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.ignition.ignition import IgnitionSource
 from warp_torchrl.world.state.cells import holds_trees
-from warp_torchrl.world.terrain.cells import read_cells
+from warp_torchrl.world.terrain.cells import read_cells, read_times
 from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.source import LandscapeSource, map_size
 
@@ -34,6 +35,15 @@ def read_ignition(path: str | PathLike[str], grid: Grid) -> np.ndarray:
         ValueError: If the file is missing, damaged or of no such kind, or lights no cell.
     """
     return read_cells(_NAME, path, grid)
+
+
+def read_ignition_times(path: str | PathLike[str], grid: Grid, moment: Callable[[str], float]) -> np.ndarray | None:
+    """Return when a file lights each cell, float32 [rows, columns] [minutes]; None if it has no times: ``read_times``.
+
+    Raises:
+        ValueError: See ``read_times``.
+    """
+    return read_times(_NAME, path, grid, moment)
 
 
 def on_fuel(lit: np.ndarray, fuel: np.ndarray, path: str | PathLike[str]) -> np.ndarray:

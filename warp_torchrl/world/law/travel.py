@@ -193,7 +193,7 @@ def from_edges(times: Tensor, metric: Metric) -> tuple[Tensor, Tensor, Tensor, T
     """
     slowness = metric[0]
     carried = times - _drift(metric, times)
-    beside, across = carried[list(_BESIDE)], carried[list(_ACROSS)]
+    beside, across = (carried.index_select(0, _kept(ends, times.device)) for ends in (_BESIDE, _ACROSS))
     sine = ((beside - across) / slowness).clamp(0.0, _WHOLE)
     part = torch.where(sine >= _WHOLE, 1.0, sine / torch.sqrt(1.0 - sine * sine))
     time = (1.0 - part) * beside + part * across + slowness * torch.sqrt(1.0 + part * part)

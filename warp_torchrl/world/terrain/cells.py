@@ -1,8 +1,10 @@
 """Cells of a grid that a file marks: points in a CSV, a raster, or the shapes of a vector file."""
 
 import logging
+from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,10 +25,26 @@ _COLUMNS = {
     ("long", "lat"): "EPSG:4326",
 }
 """Pairs of columns of a CSV, and what they count in."""
+_TIMES: Mapping[str, float | None] = {
+    **dict.fromkeys(("hour", "hours"), 60.0),
+    **dict.fromkeys(("minute", "minutes"), 1.0),
+    **dict.fromkeys(("datetime", "time", "date_time", "timestamp")),
+}
+"""Names of columns and properties of times, and the minutes of their unit; None: a date and time."""
+_LATEST = 1e8  # minutes
 _SHOWN = 4
 """Pairs that a message names."""
 _LARGEST = (255, 32767, 65535)  # of bytes and of words
 _log = logging.getLogger("warp_torchrl")
+
+
+class _Points(NamedTuple):
+    """Points of a CSV."""
+
+    first: np.ndarray  # their two coordinates, float64 [n] each
+    second: np.ndarray
+    unit: str
+    time: tuple[str, list[str]] | None = None  # name of the column of times, and its cells
 
 
 def read_cells(name: str, path: str | PathLike[str], grid: Grid) -> np.ndarray:
@@ -59,6 +77,76 @@ def read_cells(name: str, path: str | PathLike[str], grid: Grid) -> np.ndarray:
     if not cells.any():
         raise ValueError(f"{name} must mark a cell of the map, {path} marks none")
     return cells
+
+
+def read_times(name: str, path: str | PathLike[str], grid: Grid, moment: Callable[[str], float]) -> np.ndarray | None:
+    """Return when a file marks each cell of a grid [minutes], float32 [rows, columns]; infinite where it never does.
+
+    A CSV has a column, and shapes have a property, ``hour`` or ``minute`` (a number), or ``time`` or ``datetime`` (a
+    date and time). Of two times of a cell the earlier counts.
+
+    Args:
+        name: See ``read_cells``.
+        path: A file that ``read_cells`` has read.
+        grid: The grid.
+        moment: Returns the minutes of a date and time.
+
+    Returns:
+        The times, or None if the file has none, as a raster.
+
+    Raises:
+        ValueError: If some marks have a time and others none, or a time cannot be read.
+    """
+    file = Path(path)
+    if file.suffix.lower() in RASTERS:
+        return None
+    found = (_times_of_points if file.suffix.lower() == ".csv" else _times_of_shapes)(name, file, grid)
+    if found is None:
+        return None
+    times, read = np.full(grid.shape, np.inf, np.float32), dict[Any, float]()
+    for number, (key, value, where) in enumerate(found, start=1):
+        if value in (None, ""):
+            raise ValueError(f"{name} must have a time for each mark or for none, {path} has none for mark {number}")
+        if value not in read:
+            read[value] = _minutes(name, file, key, value, moment)
+        times[where] = np.minimum(times[where], read[value])
+    return times
+
+
+def _times_of_points(name: str, path: Path, grid: Grid) -> list[tuple[str, Any, Any]] | None:
+    """Return the column of times, the time and the place of each point on the grid; None without such a column."""
+    points = _read_pairs(name, path)
+    if points.time is None:
+        return None
+    row, column, inside = _cells_of(name, path, grid, points)
+    key, told = points.time
+    return [(key, told[at], (int(row[at]), int(column[at]))) for at in np.flatnonzero(inside)]
+
+
+def _times_of_shapes(name: str, path: Path, grid: Grid) -> list[tuple[str, Any, Any]] | None:
+    """Return the property of the time, the time and the cells of each shape; None where no shape has one."""
+    shapes = read_shapes(name, path, grid)
+    found = [_time_property(shape.properties) for shape in shapes]
+    if not any(found):
+        return None
+    return [(*(told or ("", None)), mark([shape], grid)) for shape, told in zip(shapes, found, strict=True)]
+
+
+def _time_property(properties: Mapping[str, Any]) -> tuple[str, Any] | None:
+    """Return the name and the value of the property that tells a time."""
+    told = {_column(str(name)): value for name, value in properties.items()}
+    return next(((name, told[name]) for name in _TIMES if told.get(name) is not None), None)
+
+
+def _minutes(name: str, path: Path, key: str, value: Any, moment: Callable[[str], float]) -> float:
+    """Return the minutes of a time that a file tells."""
+    unit = _TIMES[key]
+    if unit is None:
+        return moment(str(value))
+    number = to_number(str(value))
+    if number is None or not 0.0 <= number * unit <= _LATEST:
+        raise ValueError(f"{name} must have a number of 0 or more for {key}, {path} has {value!r}")
+    return number * unit
 
 
 def read_marks(name: str, path: Path, grid: Grid) -> np.ndarray:
@@ -109,7 +197,15 @@ def check_lies_on(name: str, own: Grid, grid: Grid) -> None:
 
 def _read_points(name: str, path: Path, grid: Grid) -> np.ndarray:
     """Return the cells that the points of a CSV lie in."""
-    first, second, unit = _read_pairs(name, path)
+    row, column, inside = _cells_of(name, path, grid, _read_pairs(name, path))
+    cells = np.zeros(grid.shape, bool)
+    cells[row[inside].astype(int), column[inside].astype(int)] = True
+    return cells
+
+
+def _cells_of(name: str, path: Path, grid: Grid, points: _Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return row and column of the points of a CSV, and which lie on the grid; one at least does."""
+    first, second, unit = points.first, points.second, points.unit
     if unit == "cells":
         row, column = first, second
         if not (np.rint(row) == row).all() or not (np.rint(column) == column).all():
@@ -124,13 +220,11 @@ def _read_points(name: str, path: Path, grid: Grid) -> np.ndarray:
         raise ValueError(f"{name} must have points on the map of {place}, {path} has {len(row)}, none of them there")
     if not inside.all():
         _log.warning("%s: %d of %d points of %s lie off the map", name, (~inside).sum(), len(row), path)
-    cells = np.zeros(grid.shape, bool)
-    cells[row[inside].astype(int), column[inside].astype(int)] = True
-    return cells
+    return row, column, inside
 
 
-def _read_pairs(name: str, path: Path) -> tuple[np.ndarray, np.ndarray, str]:
-    """Return the two columns of coordinates of a CSV, and their unit."""
+def _read_pairs(name: str, path: Path) -> _Points:
+    """Return the two columns of coordinates of a CSV, their unit, and the column of times."""
     named, text = named_separator(read_table_text(name, path))
     headers: list[str] = []
     for separator in [named] if named else SEPARATORS:
@@ -145,8 +239,12 @@ def _read_pairs(name: str, path: Path) -> tuple[np.ndarray, np.ndarray, str]:
                 _check_table(name, path, table, lines, (one, other))
                 places = first.index(one), first.index(other)
                 x, y = (_numbers(name, path, table, lines, place, separator) for place in places)
-                _tell(name, path, table[lines[0]], places, unit)
-                return x, y, unit
+                timed = next((first.index(key) for key in _TIMES if key in first), None)
+                _tell(name, path, table[lines[0]], places, unit, timed)
+                if timed is None:
+                    return _Points(x, y, unit)
+                cells = [table[line][timed].strip() if timed < len(table[line]) else "" for line in lines[1:]]
+                return _Points(x, y, unit, (first[timed], cells))
         headers = headers or first
     wanted = " or ".join(",".join(pair) for pair in list(_COLUMNS)[:_SHOWN])
     got = f"has the columns {','.join(headers)}" if headers else "has no points"
@@ -189,9 +287,13 @@ def _numbers(name: str, path: Path, table: list[list[str]], lines: list[int], pl
     return np.array(values, dtype=np.float64)
 
 
-def _tell(name: str, path: Path, headers: list[str], places: tuple[int, int], unit: str) -> None:
+def _tell(
+    name: str, path: Path, headers: list[str], places: tuple[int, int], unit: str, timed: int | None = None
+) -> None:
     """Report the columns that were read, their unit, and the ignored columns."""
     units = {"cells": "cells of the map, from 0", "map": "the map's coordinates"}
     read = {headers[place]: units.get(unit, f"degrees of {unit}") for place in places}
-    left = tuple(header for place, header in enumerate(headers) if place not in places and header)
+    if timed is not None:
+        read[headers[timed]] = "time"
+    left = tuple(header for place, header in enumerate(headers) if place not in (*places, timed) and header)
     report_file(Provenance(key=name, file=str(path), read=read, left=left))

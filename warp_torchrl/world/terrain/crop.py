@@ -109,6 +109,10 @@ class Crop:
         height, width = map_size(self.size)
         corners = self._maps[torch.device("cpu")][0].numpy()
         first = np.zeros(self.cover.shape, bool)
+        if len(corners) == 1:
+            row, column = divmod(int(corners[0]), self.cover.shape[1])
+            first[row : row + height, column : column + width] = True
+            return first
         first.flat[corners] = True
         padded = torch.from_numpy(np.pad(first, ((height - 1, 0), (width - 1, 0))))
         return (_sum_windows(padded, height, width) > 0).numpy()
@@ -136,10 +140,10 @@ class Crop:
         if height > rows or width > columns:
             raise ValueError(f"size must fit in the map of {rows} x {columns} cells, got {height} x {width}")
         known = np.ones(self.cover.shape, bool) if self.known is None else self.known
-        whole = _sum_windows(torch.from_numpy(~known), height, width) == 0
         if self.row is not None or self.column is not None:
-            row, column = self._fixed_corner(whole, known)
+            row, column = self._fixed_corner(known)
             return torch.tensor([row * columns + column])
+        whole = _sum_windows(torch.from_numpy(~known), height, width) == 0
         least = max(1, math.ceil(self.min_fuel * height * width - 1e-6))
         fuel = _sum_windows(holds_trees(torch.from_numpy(self.cover)), height, width)
         window = (whole & (fuel >= least)).flatten().nonzero().squeeze(1)
@@ -149,17 +153,16 @@ class Crop:
         across = whole.shape[1]
         return window // across * columns + window % across
 
-    def _fixed_corner(self, whole: Tensor, known: np.ndarray) -> tuple[int, int]:
+    def _fixed_corner(self, known: np.ndarray) -> tuple[int, int]:
         """Return ``row`` and ``column`` if they name a window without nodata."""
-        corner = []
-        for name, count in zip(("row", "column"), whole.shape):
-            value = getattr(self, name)
+        corner, (height, width) = [], map_size(self.size)
+        for name, side, length in zip(("row", "column"), known.shape, (height, width), strict=True):
+            value, count = getattr(self, name), side - length + 1
             if type(value) is not int or not 0 <= value < count:
                 raise ValueError(f"{name} must be whole, in 0..{count - 1} for a window in the map, got {value}")
             corner.append(value)
         row, column = corner
-        if not whole[row, column]:
-            height, width = map_size(self.size)
+        if not known[row : row + height, column : column + width].all():
             inside = np.zeros_like(known)
             inside[row : row + height, column : column + width] = True
             lies = whereabouts(~known, inside)

@@ -54,11 +54,12 @@ def write_geotiff(
         "crs": grid.crs,
         "transform": window_transform(grid, corner),
         "compress": "deflate",
+        "interleave": "band",  # bands are written one after the other, so that no copy of all of them is made
     }
     with rasterio.MemoryFile() as memory:  # GDAL tells of a full disk too late to be caught
         with memory.open(**profile) as file:
-            file.write(np.stack([band.astype(dtype) for band in bands.values()]))
-            for number, name in enumerate(bands, start=1):
+            for number, (name, band) in enumerate(bands.items(), start=1):
+                file.write(band.astype(dtype, copy=False), number)
                 file.set_band_description(number, name)
                 if unit:
                     file.set_band_unit(number, unit)
@@ -118,7 +119,7 @@ def _as_band(name: str, layer: Tensor | np.ndarray) -> np.ndarray:
     if kind not in "bfiu":
         raise ValueError(f"{name} must hold numbers or truths, got {values.dtype}")
     if kind == "f":
-        return values.astype(np.float32)
+        return values.astype(np.float32, copy=False)
     if kind == "b":
         return values.astype(np.uint8)
     if values.dtype.itemsize < 8 and values.dtype != np.int8:
