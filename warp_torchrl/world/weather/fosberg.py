@@ -2,7 +2,8 @@
 
 A reference moisture of temperature and humidity, and a correction by month, time of day, aspect, slope and shade
 (Rothermel 1983, INT-143; today NWCG, PMS 437, "Dead fuel moisture content", tables A to D). Corrections are those of
-ground within 1000 ft of the station's elevation, as BEHAVE's fine dead fuel moisture tool has them.
+ground within 1000 ft of the station's elevation, as BEHAVE's fine dead fuel moisture tool has them; another
+transcription differs in five of them, each by 1.
 
 The corrections end at 20 o'clock and begin at 8. In the night between, ours are those of shaded fuel: of the last
 column until midnight, of the first one after.
