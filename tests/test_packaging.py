@@ -118,7 +118,8 @@ def test_a_program_s_function_is_there(name):
 
 
 @pytest.mark.parametrize(
-    "extra", ["gis", "calibration", "tensorboard", "figures", "interop", "docs", "search", "sweep", "live", "video"]
+    "extra",
+    ["gis", "netcdf", "calibration", "tensorboard", "figures", "interop", "docs", "search", "sweep", "live", "video"],
 )
 def test_development_has_what_each_extra_has(extra):
     extras = PROJECT["optional-dependencies"]

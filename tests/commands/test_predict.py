@@ -203,7 +203,8 @@ def test_a_folder_that_holds_something_is_left_alone(folder, capsys):
 def test_help_names_every_option(capsys):
     assert main(["--help"]) == 0
     said = capsys.readouterr().out
-    assert all(f"{name}:" in said for name in composed([]) if name not in ("landscape", "fire"))
+    ours = [name for name in composed([]) if name not in ("landscape", "fire")]
+    assert all(f"\n  {name}=" in said or f"\n  {name}." in said for name in ours)
 
 
 def test_a_configuration_shows_every_value():
@@ -316,3 +317,34 @@ def test_wind_is_bent_by_hills_where_that_is_asked(folder):
     assert bent[26] > 1.1 * plain[26], "faster on top"
     told = json.loads((folder / "terrain" / "report.json").read_text())
     assert told["configuration"]["wind"] == "terrain" and told["configuration"]["hills"]["layers"] == 6
+
+
+@pytest.mark.slow
+def test_gusts_and_acceleration_act_and_the_column_of_gusts_is_read_for_them(folder):
+    rows = "\n".join(f"2024-07-01 {hour}:00,10.8,270,90,{gust}" for hour, gust in ((12, 20), (13, "")))
+    (folder / "gusts.csv").write_text(f"datetime,WS,WD,FFMC,Gust\n{rows}\n")
+    given = {"weather": folder / "gusts.csv", "fires": 1, "fire.curing": 95}
+    told = []
+    for number, each in enumerate(({}, {"gusts": "true", "fire.acceleration": "true"})):
+        assert main(arguments(folder, **given, **each, out=folder / f"out{number}")) == 0
+        told.append(json.loads((folder / f"out{number}" / "report.json").read_text()))
+    plain, young = (each["by_hour"][-1]["area_ha"]["median"] for each in told)
+    assert young < 0.9 * plain
+    read = [next(each for each in one["files"] if each["key"] == "weather")["read"] for one in told]
+    assert "Gust" not in read[0] and read[1]["Gust"] == "wind_gust, km/h"
+
+
+@pytest.mark.parametrize(
+    "changes, why",
+    [
+        ({"moisture": "fosberg"}, "moisture=fosberg is read by Rothermel's fuels"),
+        ({"season": "date"}, "season=date knows Canada and Alaska in Canadian fuel, got 0.4"),
+        ({"gusts": "true"}, "gusts needs a column of gusts in the weather, or gustiness.factor"),
+        ({"gustiness.factor": 1.5}, "gustiness is read with gusts=true"),
+        ({"gusts": "true", "observed": "seen.geojson"}, "gusts must be false with observed=FILE"),
+        ({"weather": "none.nc"}, "weather must be"),
+    ],
+)
+def test_options_of_the_air_that_do_not_fit_are_refused(folder, capsys, changes, why):
+    assert main(arguments(folder, **changes)) == 2
+    assert why in capsys.readouterr().err and not (folder / "out" / "report.json").exists()

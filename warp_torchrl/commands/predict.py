@@ -45,14 +45,13 @@ from warp_torchrl.runs.config.options import PredictionOptions
 from warp_torchrl.runs.output import output_folder
 from warp_torchrl.system import disk, memory
 from warp_torchrl.system.provenance import Provenance, gathered
-from warp_torchrl.world.air.folder import times_of
+from warp_torchrl.world.air.files import minutes_in
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.ensemble.parameters import Deviations
 from warp_torchrl.world.fires.members import Members
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.terrain.raster import Raster
-from warp_torchrl.world.weather.table import minutes_until
 
 log = logging.getLogger("warp_torchrl")
 
@@ -149,8 +148,8 @@ def _observations(case: Case, options: PredictionOptions) -> list[Observation]:
         return []
 
     def moment(text: str) -> float:
-        path, zone = times_of(str(options.weather)), options.observed_zone
-        return minutes_until(text, path, options.units, "the time of what is observed", zone) - case.start
+        path, zone = str(options.weather), options.observed_zone
+        return minutes_in(path, text, options.units, "the time of what is observed", zone) - case.start
 
     height, width = case.ignition.shape
     end = _minutes(case, options)
@@ -168,7 +167,7 @@ def _correct(case: Case, options: PredictionOptions, seen: Sequence[Observation]
         ground=case.ground,
         cell_size=case.cell_size,
         fire=case.fire,
-        air=Weather(table=case.weather, convergence=case.convergence, fields=case.fields),
+        air=Weather(table=case.weather, convergence=case.convergence, fields=case.fields, sunlight=case.sunlight),
         start=case.start,
         lit=case.ignition,
     )
@@ -213,6 +212,8 @@ def _burn(case: Case, options: PredictionOptions, corrected: Corrected | None) -
             start=case.start + begun,
             convergence=case.convergence,
             fields=case.fields,
+            sunlight=case.sunlight,
+            gusts=options.gustiness if options.gusts else None,
             members=members,
             is_seen=corrected is not None,
             embers=options.firebrands if options.embers else None,
@@ -232,7 +233,8 @@ def _report(
     from warp_torchrl import __version__
 
     found, lack = report_numbers(prediction), case.fire.bed.lack_of_canopy(case.ground)
-    known = [each.name for each in fields(case.weather) if getattr(case.weather, each.name) is not None]
+    told = (each.name for each in fields(case.weather) if each.name not in ("began", "zone"))
+    known = [name for name in told if getattr(case.weather, name) is not None]
     inputs = {
         "landscape": values["landscape"].get("path"),
         "map": f"{case.ignition.shape[0]} x {case.ignition.shape[1]} cells of {case.cell_size:g} m",
@@ -245,6 +247,7 @@ def _report(
         "ignition": f"{values['ignition']}, {int(prediction.lit.sum())} cells with fuel of {_marked(case)}",
         **_barriers(case, values),
         "cells of fuels": case.fire.told_fuel(case.ground),
+        **({"season": case.season} if case.season else {}),
         **dict(each.split(": ", 1) for each in case.files),
         "law": without_targets(values["fire"]),
     }

@@ -5,24 +5,30 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from warp_torchrl.prediction.files import MapPlace
+from warp_torchrl.prediction.season import Season
 from warp_torchrl.runs.config.options import PredictionOptions
 from warp_torchrl.world.air.fields import WeatherFields
-from warp_torchrl.world.air.folder import rasters_of, read_folder, times_of
+from warp_torchrl.world.air.files import minutes_in, read_any
+from warp_torchrl.world.air.folder import rasters_of
+from warp_torchrl.world.air.points import window_of
+from warp_torchrl.world.air.sunlight import Sunlight, by_sunlight
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.ignition.file import read_ignition, read_ignition_times
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.terrain.barriers import read_barriers
+from warp_torchrl.world.terrain.crs import WGS84, project, stated_crs
 from warp_torchrl.world.terrain.geotiff import local_grid
 from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.raster import Raster
 from warp_torchrl.world.terrain.source import LandscapeSource
 from warp_torchrl.world.weather.convergence import grid_convergence
-from warp_torchrl.world.weather.table import WeatherTable, minutes_until, read_weather
+from warp_torchrl.world.weather.table import WeatherTable
 
 _MINUTE = 1e-3  # by which two times may be off for rounding [minutes]
 _NEAR = 0.005  # share by which a cell's side may be off
@@ -44,6 +50,8 @@ class Case:
     closed: Tensor | None = None  # cells of barriers, bool [H, W]
     fields: WeatherFields | None = None  # the weather by place
     files: Sequence[str] = ()  # what is read of each file of the map, and what is left
+    sunlight: Sequence[Sunlight] | None = None  # how dead fuel differs by aspect, slope and shade, row by row
+    season: str | None = None  # what the date tells of live fuel
 
 
 def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOptions) -> Case:
@@ -69,6 +77,12 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
     if options.barriers is not None:
         closed = torch.as_tensor(read_barriers(options.barriers, place.grid, options.barrier_width))[rows, columns]
         ground = replace(ground, age=ground.age * ~closed)  # nothing grows there
+    told, sunlight = None, None
+    middle = _middle(place, (height, width))
+    if options.moisture == "fosberg":
+        weather, sunlight = _sunlit(weather, fire, by_place, middle)
+    if options.season == "date":
+        fire, weather, told = _season(ground, middle, start)(fire, weather)
     return Case(
         ground=options.hills.shaped(ground, cell_size) if options.wind == "terrain" else ground,
         place=place,
@@ -82,15 +96,16 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
         closed=closed,
         files=_files(source, str(options.ignition), *rasters_of(str(options.weather))),
         fields=by_place,
+        sunlight=sunlight,
+        season=told,
     )
 
 
 def _started(options: PredictionOptions, grid: Grid, lit: Tensor) -> tuple[float, Tensor, Tensor | None]:
     """Return the start [minutes after the weather's first row], what burns then, and when more is lit since then."""
-    weather = times_of(str(options.weather))
 
     def moment(text: str, name: str = "the time of an ignition") -> float:
-        return minutes_until(text, weather, options.units, name)
+        return minutes_in(str(options.weather), text, options.units, name)
 
     start = moment(options.start, "start") if isinstance(options.start, str) else options.start
     found = read_ignition_times(str(options.ignition), grid, moment)
@@ -113,17 +128,46 @@ def _started(options: PredictionOptions, grid: Grid, lit: Tensor) -> tuple[float
 def _weather(
     options: PredictionOptions, place: MapPlace, size: tuple[int, int], convergence: float
 ) -> tuple[WeatherTable, WeatherFields | None]:
-    """Return the weather by the hour, and by place where it is a folder of rasters."""
-    path = Path(str(options.weather))
+    """Return the weather by the hour, and by place where it is a folder of rasters or a netCDF file."""
+    asked = (*["wind_gust"] * options.gusts, *["cloud"] * (options.moisture == "fosberg"))
     how: dict[str, Any] = {
         "wind_height": options.wind_height,
         "start_ffmc": options.start_ffmc,
         "bui": options.bui,
         "units": options.units,
+        "asked": asked,
     }
-    if not path.is_dir():
-        return read_weather(str(options.weather), **how), None
-    return read_folder(path, place.grid, place.corner, size, convergence=convergence, **how)
+    return read_any(str(options.weather), place.grid, place.corner, size, convergence, **how)
+
+
+def _sunlit(
+    weather: WeatherTable, fire: RateFire, fields: WeatherFields | None, middle: tuple[float, float] | None
+) -> tuple[WeatherTable, list[Sunlight]]:
+    """Return the weather with the dead moistures of level ground, and how they differ by place."""
+    if fire.bed.table is None:
+        raise ValueError("moisture=fosberg is read by Rothermel's fuels, fbfm13 and fbfm40, got fire.model=fbp")
+    if fields is not None:
+        raise ValueError("moisture=fosberg is read with a table of weather, got weather by place")
+    latitude, longitude = middle or (0.0, None)
+    return by_sunlight(weather, longitude, in_south=latitude < 0.0)
+
+
+def _season(ground: Landscape, middle: tuple[float, float] | None, start: float) -> Season:
+    if middle is None:
+        raise ValueError("season=date needs a map with a CRS, to know its latitude, got none")
+    elevation = None if ground.elevation is None else float(ground.elevation.mean())
+    return Season(latitude=middle[0], longitude=middle[1], elevation=elevation, start=start)
+
+
+def _middle(place: MapPlace, size: tuple[int, int]) -> tuple[float, float] | None:
+    """Return latitude and longitude of the middle of a map [degrees]; None where it has no place on Earth."""
+    if not place.grid.is_on_earth:
+        return None
+    west, south, east, north = window_of(place.grid, place.corner, size).bounds
+    to = stated_crs("landscape", WGS84)
+    x, y = (np.array([(low + high) / 2.0]) for low, high in ((west, east), (south, north)))
+    longitude, latitude = project("landscape", x, y, place.grid.crs, to)
+    return float(latitude[0]), float(longitude[0])
 
 
 def _files(source: LandscapeSource, *others: str | Path) -> list[str]:

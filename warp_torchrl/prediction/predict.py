@@ -1,7 +1,7 @@
 """Prediction of many fires on one map under law ``rate``: its maps and curves."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
@@ -10,10 +10,12 @@ from torch import Tensor
 from warp_torchrl.prediction.counts import Counter
 from warp_torchrl.prediction.tally import Tally
 from warp_torchrl.world.air.fields import WeatherFields
+from warp_torchrl.world.air.sunlight import Sunlight
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.behaviour.firebrands import Firebrands
 from warp_torchrl.world.fires.members import Members
+from warp_torchrl.world.fires.pieces import Gusts
 from warp_torchrl.world.fires.sightings import beside
 from warp_torchrl.world.fires.spell import spells_of
 from warp_torchrl.world.law.rate import RateFire
@@ -136,6 +138,8 @@ def predict(
     start: float = 0.0,
     convergence: float = 0.0,
     fields: WeatherFields | None = None,
+    sunlight: Sequence[Sunlight] | None = None,
+    gusts: Gusts | None = None,
     members: Members | None = None,
     is_seen: bool = False,
     embers: Firebrands | None = None,
@@ -161,6 +165,8 @@ def predict(
         start: When the fires start, since the weather's first row began [minutes].
         convergence: Angle from true north, of the weather's bearings, to the map's grid north, clockwise [degrees].
         fields: The weather's hours by place on the map, whose means are the table's rows; None: one weather for all.
+        sunlight: How dead fuel differs by aspect, slope and shade, row by row: ``air.sunlight.by_sunlight``.
+        gusts: How fires draw their winds about the mean; None: they have the mean wind.
         members: By what fires differ in rate, wind and moisture, one for each; None: by ``fire_deviation`` alone.
         is_seen: Whether the ignition is what a fire had burned when it was seen: its front is on average half a cell
             ahead then.
@@ -183,9 +189,12 @@ def predict(
     table = weather if isinstance(weather, WeatherTable) else read_weather(weather)
     left = lasting(table, start)
     minutes = left if hours is None else 60.0 * hours
-    met = spells_of(Weather(table=table, convergence=convergence, fields=fields), minutes, start)
+    met = spells_of(Weather(table=table, convergence=convergence, fields=fields, sunlight=sunlight), minutes, start)
     front = beside(ignition.cpu()) if is_seen else None
     who = Members.plain(fires) if members is None else members
+    if gusts is not None:
+        _check_gusts(gusts, table)
+        met, who = gusts.blocks(met), replace(who, gusts=world_key(seed + torch.arange(fires)))
     order = who.by_pace()
     burning = who.part(order).fires(law, ground, met, cell_size, front, embers, in_paces=True, later=later)
     lit = ignition.cpu() & burning.fuel
@@ -274,6 +283,11 @@ def _check_numbers(fires: int, area: float | None, hours: float | None, seed: in
         raise ValueError(f"hours must be over 0 and at most 1e5, got {hours:g}")
     if not 0 <= seed <= _LARGEST_SEED:
         raise ValueError(f"seed must be in 0..2^62, got {seed}")
+
+
+def _check_gusts(gusts: Gusts, table: WeatherTable) -> None:
+    if gusts.factor is None and table.wind_gust is None:
+        raise ValueError("gusts needs a column of gusts in the weather, or gustiness.factor, got neither")
 
 
 def _check_times(start: float, convergence: float) -> None:

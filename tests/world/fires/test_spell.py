@@ -3,8 +3,13 @@
 import pytest
 import torch
 
+from warp_torchrl.world.air.sunlight import Sunlight
 from warp_torchrl.world.behaviour.spread import Spread
-from warp_torchrl.world.fires.spell import heads
+from warp_torchrl.world.fires.spell import Spell, air_in, heads, spread_in
+from warp_torchrl.world.law.rate import RateFire
+from warp_torchrl.world.state.state import Landscape
+from warp_torchrl.world.state.window import Window
+from warp_torchrl.world.weather.fosberg import correction
 
 
 @pytest.mark.parametrize(("ratio", "rear"), [(2.0, 0.718), (1.0, 10.0)], ids=["an ellipse", "a round fire has no rear"])
@@ -21,3 +26,24 @@ def test_the_rear_goes_slower_by_the_eccentricity(ratio, rear):
     )
     assert heads(spread).flatten().tolist() == pytest.approx([10.0, rear, 3000.0, 2.0], abs=1e-3)
     assert heads(spread, with_kind=True).flatten().tolist()[4:] == [1.0]
+
+
+def test_steep_ground_in_the_sun_is_drier_and_a_window_has_what_the_map_has():
+    rows, level = torch.arange(40.0)[:, None].expand(40, 30), torch.full((1, 40, 30), 102, dtype=torch.int16)
+    cover = torch.full((1, 40, 30), 2, dtype=torch.uint8)
+    ridge = Landscape(cover=cover, age=torch.full_like(cover, 10), elevation=(-20.0 * (rows - 20.0).abs())[None])
+    sunlight = Sunlight(5.0 + correction(8, 14.5))  # north 8, south 6, on a slope of 2 in 3
+    moisture = torch.tensor([float(sunlight.level), 7.0, 8.0, 60.0, 90.0, 90.0, 60.0])
+    spell = Spell(torch.tensor([0.01, 0.0]), 60.0, moisture, sunlight=sunlight)
+    law, ground = RateFire(model="fbfm40", slope_gain=0.0), ridge.with_layers(fuel=level)
+    head = spread_in(law, ground, 30.0, spell).head[0]
+    told = []
+    for fine in (8.0, 6.0):
+        damp = torch.tensor([fine, fine + 1.0, fine + 2.0, 60.0, 90.0, 90.0, 60.0])
+        told.append(spread_in(law, ground, 30.0, Spell(spell.wind, 60.0, damp)))
+    assert float(head[8, 9]) == pytest.approx(float(told[0].head[0, 8, 9]), rel=1e-4)
+    assert float(head[32, 9]) == pytest.approx(float(told[1].head[0, 32, 9]), rel=1e-4) and head[32, 9] > head[8, 9]
+    window = Window(5, 4, 20, 16, (40, 30))
+    assert torch.equal(spread_in(law, ground, 30.0, spell, window).head[0], head[5:25, 4:20])
+    moist = air_in(law, ground, spell, window, 30.0)[1]
+    assert moist[0, 3, 5].tolist() == pytest.approx([8.0, 9.0, 10.0, 60.0, 90.0, 90.0, 60.0])

@@ -5,9 +5,11 @@ import pytest
 import torch
 
 from tests.world.rasters import keys, write
+from warp_torchrl.world.behaviour.fbp import fbp_spread
 from warp_torchrl.world.behaviour.moistures import moisture_row
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.terrain.raster import Raster
 from warp_torchrl.world.world import World
 
@@ -52,3 +54,24 @@ def test_moisture_is_in_0_to_400_per_cent():
     for value in (-0.1, 400.1):
         with pytest.raises(ValueError, match=r"moisture must be in \[0, 400\], got dead_1h"):
             moisture_row({"dead_1h": value})
+
+
+@pytest.mark.parametrize(
+    "code, state, slower",
+    [
+        (31, {"curing": 60.0}, True),
+        (13, {"green": True}, True),  # D-1 becomes D-2
+        (40, {"percent_conifer": 90.0}, False),
+        (6, {"foliar_moisture": 150.0}, True),
+    ],
+)
+def test_the_state_of_canadian_fuel_is_that_of_the_law(code, state, slower):
+    cover = torch.full((1, 1, 1), 3, dtype=torch.uint8)
+    land = Landscape(cover, torch.full_like(cover, 10), None).with_layers(fuel=torch.full((1, 1, 1), code).short())
+    wind, moisture = torch.tensor([7.0, 0.0])[None, :, None, None], torch.tensor([[6.0, 7, 8, 60, 90, 95, 90]])
+    usual, other = (
+        float(RateFire(model="fbp", **each).bed.spread(land, wind, moisture, 30.0).head) for each in ({}, state)
+    )
+    air = {"wind_speed": 7.0, "wind_bearing": 270.0, "slope": 0.0, "aspect": 0.0, "ffmc": 95.0, "bui": 90.0}
+    told = fbp_spread(torch.tensor([code]), **air, **state)
+    assert other == pytest.approx(float(told.head), rel=1e-4) and (other < usual) == slower

@@ -33,8 +33,10 @@ from warp_torchrl.world.weather.quantities import QUANTITIES
         ("wind_dir[80]", "wind_bearing", None, None),
         ("RH (avg)", "humidity", None, None),
         ("HFFMC", "ffmc", None, None),
+        ("wind_gusts_10m (km/h)", "wind_gust", "km/h", "10m"),
+        ("cloud_cover (%)", "cloud", "%", None),
         ("DuffMoistureCode", "dmc", None, None),
-        *((name, None, None, None) for name in ("wind", "wind_to_direction", "wind_gusts_10m (km/h)", "Temp Flag")),
+        *((name, None, None, None) for name in ("wind", "wind_to_direction", "Temp Flag")),
         *((name, None, None, None) for name in ("temperature_2m_max (°C)", "rain_trace", "ISI", "soil_temperature")),
     ],
 )

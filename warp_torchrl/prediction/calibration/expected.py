@@ -84,7 +84,7 @@ def burning_probability(log_factor: Tensor, deviation: Tensor | float) -> Tensor
 def _hours(laws: Sequence[RateFire], case: FireCase) -> list[Hour]:
     """Return the spells of a case under each law, on the whole map."""
     fires = fires_of(laws, case)
-    return [fires.hour(number) for number in range(len(case.spells))]
+    return [fires.hour(number) for number in range(len(fires.spells))]
 
 
 def _tangents(fire: RateFire, parameters: Sequence[Parameter], z: Tensor, case: FireCase) -> list[list[Tensor]]:

@@ -10,6 +10,7 @@ from warp_torchrl.validation import check_fields, did_you_mean
 from warp_torchrl.world.air.hills import Hills
 from warp_torchrl.world.behaviour.firebrands import Firebrands
 from warp_torchrl.world.ensemble.parameters import Deviations
+from warp_torchrl.world.fires.pieces import Gusts
 from warp_torchrl.world.fires.sightings import HotSpotSensor
 
 
@@ -87,8 +88,8 @@ class PredictionOptions:
     """Options of ``warp predict``, besides ``landscape`` and ``fire``.
 
     Attributes:
-        weather: CSV file of hourly weather, see ``warp_torchrl.world.weather.table``; or a folder of rasters with a
-            band an hour, see ``warp_torchrl.world.air.folder``.
+        weather: CSV file of hourly weather, see ``warp_torchrl.world.weather.table``; a folder of rasters with a
+            band an hour, see ``warp_torchrl.world.air.folder``; a netCDF file, see ``warp_torchrl.world.air.netcdf``.
         ignition: File of the ignition: points, a raster or a perimeter; points and shapes may have times, and burn from
             then on.
         barriers: File of roads, rivers and dozer lines that no flame crosses: GeoJSON or a shapefile of lines or
@@ -108,6 +109,15 @@ class PredictionOptions:
             the map's grid north already.
         wind: ``terrain`` bends the weather's wind by hills, mass-consistently; ``weather`` takes it as given.
         hills: How hills bend it: ``hills.roughness=0.1`` [m], ``hills.alpha``, ``hills.layers``, ``hills.columns``.
+        moisture: Rule of the moisture of dead fuel: ``equilibrium``, of temperature and humidity in the shade, the same
+            everywhere; ``fosberg``, the tables of Fosberg and Deeming by month, hour, aspect, slope, crowns and clouds,
+            cell by cell.
+        season: ``date`` computes live fuel from place and date where nothing else gives it: foliar moisture and leaves
+            of Canadian fuel, and by 21 days of weather before the start live moistures and curing; ``none`` leaves the
+            law's.
+        gusts: Whether each fire draws its wind about the mean, by the weather's gusts.
+        gustiness: How: ``gustiness.minutes=10`` between draws, ``gustiness.factor``, gust over mean, for a weather
+            without a column of gusts.
         start_ffmc: Fine fuel moisture code an hour before the first row, for a file without FFMC.
         bui: Buildup index, for a file without BUI, DMC and DC; None takes the law's.
         cell_size: Side of a cell [m]; None is that of the landscape.
@@ -150,6 +160,10 @@ class PredictionOptions:
     true_north: bool = True
     wind: Literal["weather", "terrain"] = "weather"
     hills: Hills = field(default_factory=Hills)
+    moisture: Literal["equilibrium", "fosberg"] = "equilibrium"
+    season: Literal["none", "date"] = "none"
+    gusts: bool = False
+    gustiness: Gusts = field(default_factory=Gusts)
     start_ffmc: float = 85.0
     bui: float | None = None
     cell_size: float | None = None
@@ -187,6 +201,10 @@ class PredictionOptions:
             raise ValueError(f"barrier_width is read with barriers=FILE, got {self.barrier_width:g} and no file")
         if self.firebrands != Firebrands() and not self.embers:
             raise ValueError("firebrands is read with embers=true, got embers=false")
+        if self.gustiness != Gusts() and not self.gusts:
+            raise ValueError("gustiness is read with gusts=true, got gusts=false")
+        if self.gusts and self.observed is not None:
+            raise ValueError("gusts must be false with observed=FILE, whose corrections know the mean wind, got true")
         read = {"rate": Deviations(rate=self.members.rate), "all": self.members, "none": Deviations()}
         if self.observed is None and self.members != read[self.uncertain]:
             what = "members" if self.uncertain == "none" else "members but members.rate"

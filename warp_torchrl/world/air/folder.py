@@ -2,24 +2,22 @@
 
 import math
 import re
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from warp_torchrl.system.provenance import Provenance, report_file
-from warp_torchrl.world.air.fields import Lattice, WeatherFields
+from warp_torchrl.world.air.fields import WeatherFields
 from warp_torchrl.world.air.gridded import STRONGEST
+from warp_torchrl.world.air.points import PlacedWeather, points_over, put, window_of, with_means
 from warp_torchrl.world.air.wind import turned
 from warp_torchrl.world.behaviour.moistures import MOISTURES
 from warp_torchrl.world.terrain.bands import DEGREES, SPEED_UNITS, factor_of
 from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.layer import RASTERS, Header, read_header, read_layer
-from warp_torchrl.world.terrain.resampling import fill, project_bounds, resample
 from warp_torchrl.world.weather.table import OPEN_10M_OVER_20FT, WeatherTable, WindHeight, read_weather
 
 TABLE = "weather.csv"
@@ -39,14 +37,6 @@ NAMES: Mapping[str, str] = {
 }
 """Ends of the names of files, by what they hold: ``weather_ws.tif``, ``ws.tif``."""
 _PERCENT = dict.fromkeys(("%", "percent", "per cent"), 1.0)
-_MOST_UNKNOWN = 0.25  # share of the points over a map
-
-
-class FolderWeather(NamedTuple):
-    """Weather of a folder: its hours with their means over the map, and its fields."""
-
-    table: WeatherTable
-    fields: WeatherFields
 
 
 def read_folder(
@@ -60,7 +50,8 @@ def read_folder(
     start_ffmc: float = 85.0,
     bui: float | None = None,
     units: Mapping[str, str] | None = None,
-) -> FolderWeather:
+    asked: Collection[str] = (),
+) -> PlacedWeather:
     """Return the weather of a folder of rasters over a map.
 
     Files are known by the ends of their names, ``NAMES``; each has a band an hour, or one for all hours. Speed and
@@ -76,15 +67,15 @@ def read_folder(
         start_ffmc: See ``read_weather``, of the table of the folder.
         bui: The same.
         units: Unit of ``wind_speed`` where its file states none.
+        asked: See ``read_weather``.
 
     Raises:
         ValueError: If a file is missing, damaged, of other hours or another place, or a unit is not known.
     """
     units, headers = units or {}, _headers(folder)
-    table = _table(folder, _count(folder, headers), wind_height, start_ffmc, bui, units)
+    table = _table(folder, _count(folder, headers), wind_height, start_ffmc, bui, units, asked)
     hours = _count(folder, headers) if table is None else len(table.hours)
-    window = _window(grid, corner, grid.shape if size is None else size)
-    points, lattice = _points(headers, window)
+    points, lattice = points_over(window_of(grid, corner, size), [each.grid for each in headers.values()])
     factor, height = _to_metres_a_second(headers, units, wind_height)
     wind = _wind(headers, points, hours, factor, convergence)
     wind *= OPEN_10M_OVER_20FT if height == "20ft" else 1.0
@@ -95,7 +86,7 @@ def read_folder(
             moisture[:, index] = _on(points, name, headers[name], hours)
     fields = WeatherFields(lattice, wind, moisture)
     _tell(headers, height)
-    return FolderWeather(_with_means(table, fields, convergence), fields)
+    return PlacedWeather(with_means(table, fields, convergence), fields)
 
 
 def _headers(folder: Path) -> dict[str, Header]:
@@ -122,30 +113,6 @@ def _count(folder: Path, headers: Mapping[str, Header]) -> int:
     if len(counts) > 1:
         raise ValueError(f"weather must have rasters of as many bands in {folder}, got {sorted(counts)}")
     return counts.pop() if counts else 1
-
-
-def _window(grid: Grid, corner: tuple[int, int], size: tuple[int, int]) -> Grid:
-    """Return a window of a grid as a grid."""
-    (row, column), (a, b, left, d, e, top) = corner, grid.transform[:6]
-    place = type(grid.transform)(a, b, left + a * column + b * row, d, e, top + d * column + e * row)
-    return Grid(size, grid.crs, place)
-
-
-def _points(headers: Mapping[str, Header], window: Grid) -> tuple[Grid, Lattice]:
-    """Return points over a map, as far apart as the cells of the finest raster."""
-    joined = min(max(1, round(_cells_to_one(each.grid, window))) for each in headers.values())
-    rows, columns = (max(2, math.ceil(each / joined)) for each in window.shape)
-    a, b, left, d, e, top = window.transform[:6]
-    place = type(window.transform)(a * joined, b * joined, left, d * joined, e * joined, top)
-    middle = (joined - 1) / 2.0
-    return Grid((rows, columns), window.crs, place), Lattice((middle, joined), (middle, joined))
-
-
-def _cells_to_one(grid: Grid, window: Grid) -> float:
-    """Return how many of the map's cells lie side by side in one of a raster."""
-    west, south, east, north = project_bounds("weather", grid, window.crs)
-    across = (east - west) / grid.shape[1] / abs(window.transform[0])
-    return min(across, (north - south) / grid.shape[0] / abs(window.transform[4]))
 
 
 def _to_metres_a_second(
@@ -182,7 +149,7 @@ def _wind(headers: Mapping[str, Header], points: Grid, hours: int, factor: float
             angle = np.radians(b)
             u, v = -a * np.sin(angle), -a * np.cos(angle)
         _check_strength(one.path, u[known & also], v[known & also])
-        made.append([_put(name, each, known & also, one.grid, points) for name, each in (("u", u), ("v", v))])
+        made.append([put(name, each, known & also, one.grid, points) for name, each in (("u", u), ("v", v))])
     return turned(torch.tensor(np.array(made), dtype=torch.float32), torch.deg2rad(torch.tensor([convergence])))
 
 
@@ -194,28 +161,13 @@ def _check_strength(path: Path, u: np.ndarray, v: np.ndarray) -> None:
 
 def _on(points: Grid, name: str, header: Header, hours: int) -> Tensor:
     """Return a layer's bands at the points, float32 [T, h, w]."""
-    made = [_put(name, *_band(name, header, hour), header.grid, points) for hour in range(hours)]
+    made = [put(name, *_band(name, header, hour), header.grid, points) for hour in range(hours)]
     return torch.tensor(np.array(made), dtype=torch.float32)
 
 
 def _band(name: str, header: Header, hour: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the values of an hour and where they are known; of a raster with one band always those."""
     return read_layer(name, header.path, 1 if len(header.bands) == 1 else hour + 1)
-
-
-def _put(name: str, values: np.ndarray, known: np.ndarray, own: Grid, points: Grid) -> np.ndarray:
-    """Return values at the points; beyond the raster's last middles those of the points beside."""
-    if own.is_on_earth or points.is_on_earth:
-        found, there = resample(name, values, known, own, points, "bilinear")
-    elif own.differs_in(points):
-        raise ValueError(
-            f"{name} must have a CRS, and so must the map, to be interpolated, got {own.crs}, {points.crs}"
-        )
-    else:
-        found, there = values, known
-    if there.mean() < 1.0 - _MOST_UNKNOWN:
-        raise ValueError(f"{name} must be known over the map, it is in {100.0 * there.mean():.0f} % of it")
-    return fill(found, there)
 
 
 def _tell(headers: Mapping[str, Header], height: WindHeight) -> None:
@@ -231,11 +183,6 @@ def rasters_of(weather: str | Path) -> list[Path]:
     return [each.path for each in _headers(Path(weather)).values()] if Path(weather).is_dir() else []
 
 
-def times_of(weather: str | Path) -> Path:
-    """Return the file that says when the hours of a weather are: of a folder its table."""
-    return Path(weather) / TABLE if Path(weather).is_dir() else Path(weather)
-
-
 def _table(
     folder: Path,
     hours: int,
@@ -243,25 +190,13 @@ def _table(
     start_ffmc: float,
     bui: float | None,
     units: Mapping[str, str],
+    asked: Collection[str],
 ) -> WeatherTable | None:
     """Return the folder's table, whose rows are the rasters' hours; None where it has none."""
     path = folder / TABLE
     if not path.is_file():
         return None
-    table = read_weather(path, wind_height=wind_height, start_ffmc=start_ffmc, bui=bui, units=units)
+    table = read_weather(path, wind_height=wind_height, start_ffmc=start_ffmc, bui=bui, units=units, asked=asked)
     if hours not in (1, len(table.hours)):
         raise ValueError(f"{path} must have a row for each of the rasters' {hours} bands, got {len(table.hours)}")
     return table
-
-
-def _with_means(table: WeatherTable | None, fields: WeatherFields, convergence: float) -> WeatherTable:
-    """Return a table of the fields' means over the map, and of the table where they say nothing."""
-    winds, moistures = fields.means
-    bearing = (torch.rad2deg(torch.atan2(-winds[:, 0], -winds[:, 1])) + convergence) % 360.0
-    known = {
-        name: column for name, column in zip(MOISTURES, moistures.unbind(1), strict=True) if not column.isnan().any()
-    }
-    of_wind = {"wind_speed": winds.square().sum(1).sqrt(), "wind_bearing": bearing, "wind_height": "10m"}
-    if table is None:
-        return WeatherTable(hours=torch.arange(len(winds), dtype=torch.float32), **of_wind, **known)  # type: ignore[arg-type]
-    return replace(table, **of_wind, **known)  # type: ignore[arg-type]

@@ -1,7 +1,7 @@
 """Wind and moisture by the hour, from a table of weather."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import Literal
@@ -11,6 +11,7 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.air.fields import Field, WeatherFields
+from warp_torchrl.world.air.sunlight import Sunlight
 from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.behaviour.moistures import MOISTURES
@@ -20,6 +21,7 @@ from warp_torchrl.world.weather.convergence import grid_convergence
 from warp_torchrl.world.weather.table import OPEN_10M_OVER_20FT, WeatherTable, read_weather
 
 _MINUTES = 60.0  # of an hour
+_LEAST = 0.5  # m/s, of a wind that has gusts
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,6 +41,7 @@ class Weather(Wind):
         convergence: Angle from true north to grid north [degrees]; None is that at the middle of the landscape.
         minutes_per_tick: Minutes of a tick; None takes those of the fire.
         fields: The same hours by place, for ``by_place``; the rows are their means.
+        sunlight: How dead fuel differs by aspect, slope and shade in each row; the rows are level ground.
 
     Raises:
         ValueError: If there is no table, or the file cannot be read.
@@ -53,6 +56,7 @@ class Weather(Wind):
     convergence: float | None = None
     minutes_per_tick: float | None = None
     fields: WeatherFields | None = field(default=None, repr=False)
+    sunlight: Sequence[Sunlight] | None = field(default=None, repr=False)
     _rows: WeatherTable = field(init=False, repr=False)
     _wind: Tensor = field(init=False, repr=False)  # float32 [T, 2], (u, v) [m/s]
     _moisture: Tensor = field(init=False, repr=False)  # float32 [T, 7], NaN where not known
@@ -113,6 +117,17 @@ class Weather(Wind):
     def by_place(self, row: int) -> Field | None:
         """Return how the weather of a row differs by place; None where it is the same everywhere."""
         return None if self.fields is None else self.fields.at(row)
+
+    def in_sun(self, row: int) -> Sunlight | None:
+        """Return how dead fuel differs by aspect, slope and shade in a row; None where it does not."""
+        return None if self.sunlight is None else self.sunlight[row]
+
+    def gust(self, row: int) -> float:
+        """Return the gusts over the mean wind of a row; 1 where none are known."""
+        gusts, speed = self._rows.wind_gust, float(self._rows.wind_speed[row])
+        if gusts is None or math.isnan(gusts[row]) or speed < _LEAST:
+            return 1.0
+        return max(1.0, float(gusts[row]) / speed)
 
     def spells(self, minutes: float, start: float = 0.0) -> Iterator[tuple[int, Tensor, Tensor, float]]:
         """Return the row, the wind [2], the moisture [7] and the minutes of each spell until some minutes have gone.

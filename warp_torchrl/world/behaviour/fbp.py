@@ -2,13 +2,15 @@
 
 Equations: Forestry Canada Fire Danger Group 1992, "Development and structure of the Canadian Forest Fire Behavior
 Prediction System", ST-X-3; with the corrections of Wotton, Alexander and Taylor 2009, GLC-X-10. Numbers of equations
-are those of ST-X-3 unless GLC-X-10 is named. Results are for the steady state: a fire's first minutes are slower.
+are those of ST-X-3 unless GLC-X-10 is named. Results are for the steady state, unless a fire's first minutes are asked
+for: see ``behaviour.acceleration``.
 Crowning is included: where the head is fast enough, crowns burn, and C-6 then spreads faster.
 """
 
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.behaviour.acceleration import OPEN, mean_share, slowed, under_canopy
 from warp_torchrl.world.behaviour.fbp_fuels import FUEL_TYPES, FbpFuels, Number, fbp_fuels
 from warp_torchrl.world.behaviour.spread import Spread
 
@@ -16,6 +18,8 @@ KMH = 3.6
 """Kilometres an hour in a metre a second."""
 _CALM = 1e-6
 """A wind [km/h] too weak to matter, that gives a fire without wind and slope a direction, and a gradient."""
+FOLIAR_MOISTURE = 97.0
+"""Water in needles that eq. 61 divides by [per cent]."""
 _ASPEN = FUEL_TYPES["D-1"]
 
 
@@ -33,7 +37,8 @@ def fbp_spread(
     percent_dead_fir: Number = 35.0,
     grass_load: Number = 0.35,
     green: bool = False,
-    foliar_moisture: Number = 97.0,
+    foliar_moisture: Number = FOLIAR_MOISTURE,
+    young: tuple[float, float] | None = None,
 ) -> Spread:
     """Return the behaviour of a fire's head, in tensors of the shape to which all arguments broadcast.
 
@@ -56,6 +61,7 @@ def fbp_spread(
         grass_load: Fuel in grass [kg/m2].
         green: Whether leaves are out: whether 13 is D-2 (not D-1), 60 M-2 (not M-1) and 90 M-4 (not M-3).
         foliar_moisture: Water in needles [per cent of dry weight]; 97 is the average that eq. 61 divides by.
+        young: Minutes since ignition, first and last, over which the spread is the mean of a fire that accelerates.
 
     Raises:
         ValueError: If the codes are not whole numbers, or a per cent or load lies out of its range.
@@ -83,7 +89,7 @@ def fbp_spread(
     intensity = 300 * (consumed + fuel.crown_load * crowns) * head  # eq. 69
     shape = torch.broadcast_shapes(intensity.shape, direction.shape)
     burns = fuel.a > 0
-    return Spread(
+    steady = Spread(
         head=torch.where(burns, head, 0.0).expand(shape),
         direction=direction.expand(shape),
         length_to_breadth=torch.where(burns, length_to_breadth(fuel, net_speed), 1.0).expand(shape),
@@ -91,6 +97,9 @@ def fbp_spread(
         flame_length=torch.where(burns, byram_flame_length(intensity), 0.0).expand(shape),
         kind=torch.where(burns, kind_of_fire(crowns), 0.0).expand(shape),
     )
+    if young is None:
+        return steady
+    return slowed(steady, mean_share(torch.where(fuel.is_c1, OPEN, under_canopy(crowns)), *young))
 
 
 def fine_fuel_effect(ffmc: Tensor) -> Tensor:
@@ -201,13 +210,24 @@ def byram_flame_length(intensity: Tensor) -> Tensor:
 
 
 def foliar_moisture(latitude: Number, longitude: Number, day: Number, elevation: Number | None = None) -> Tensor:
-    """Return the water in conifers' needles in Canada [per cent of dry weight], 85 to 120 (eqs. 1 to 8).
+    """Return the water in conifers' needles in Canada [per cent of dry weight], 85 to 120 (eqs. 5 to 8).
 
     Args:
         latitude: [degrees north].
         longitude: [degrees east; Canada's are negative].
         day: Day of the year, 1..366.
         elevation: Above the sea [m]; None where it is not known.
+    """
+    away = days_from_lowest(latitude, longitude, day, elevation).abs()
+    spring = 85 + 0.0189 * away**2
+    summer = 32.9 + 3.17 * away - 0.0288 * away**2
+    return torch.where(away < 30, spring, torch.where(away < 50, summer, 120.0))
+
+
+def days_from_lowest(latitude: Number, longitude: Number, day: Number, elevation: Number | None = None) -> Tensor:
+    """Return the days since the water in needles was lowest, negative before (eqs. 1 to 4).
+
+    The arguments are those of ``foliar_moisture``.
     """
     latitude, longitude, day = (torch.as_tensor(value, dtype=torch.float32) for value in (latitude, longitude, day))
     if elevation is None:
@@ -216,7 +236,4 @@ def foliar_moisture(latitude: Number, longitude: Number, day: Number, elevation:
     else:
         normal = 43 + 33.7 * torch.exp(-0.0351 * (150 + longitude))
         lowest = 142.1 * latitude / normal + 0.0172 * elevation
-    away = (day - torch.round(lowest)).abs()
-    spring = 85 + 0.0189 * away**2
-    summer = 32.9 + 3.17 * away - 0.0288 * away**2
-    return torch.where(away < 30, spring, torch.where(away < 50, summer, 120.0))
+    return day - torch.round(lowest)

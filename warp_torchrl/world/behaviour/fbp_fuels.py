@@ -18,6 +18,8 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+CURING = 80.0
+"""Cured grass [per cent] where nothing says it, as the R package cffdrs has it."""
 Number = float | Tensor
 """A number, or a tensor of them that broadcasts with the map of fuels."""
 

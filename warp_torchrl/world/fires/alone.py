@@ -18,6 +18,7 @@ from warp_torchrl.world.backends.spreading import Hour
 from warp_torchrl.world.behaviour.firebrands import Firebrands
 from warp_torchrl.world.fires.fastest import RowsOfMap, fastest_heads, heads_of_strips
 from warp_torchrl.world.fires.later import LaterFires
+from warp_torchrl.world.fires.pieces import from_ignition
 from warp_torchrl.world.fires.spell import Spell, air_in, can_ignite, heads, spread_in, ticks_of
 from warp_torchrl.world.fires.spotting import EmberGround, SpotFires
 from warp_torchrl.world.law.rate import RateFire
@@ -56,7 +57,7 @@ class Fires:
     Attributes:
         fire: The automaton.
         landscape: One landscape, batch size [1].
-        spells: The weather.
+        spells: The weather; of a law with acceleration cut into pieces, unless the fire burned before (``half_way``).
         cell_size: Side of a cell [m].
         beside: Further laws, each of another group of fires; they differ in factors, deviations and moistures alone.
         rate: Factor on the rates of each fire, float32 [B], or in each of S sectors, float32 [B, S]; None is 1.
@@ -89,6 +90,10 @@ class Fires:
     _lock: threading.Lock = field(init=False, repr=False, default_factory=threading.Lock)
     _fastest: dict[int, tuple[float, float]] = field(init=False, repr=False, default_factory=dict)
     _ended: threading.Event = field(init=False, repr=False, default_factory=threading.Event)
+
+    def __post_init__(self) -> None:
+        if self.fire.acceleration and self.half_way is None and self.root is None:
+            object.__setattr__(self, "spells", from_ignition(self.spells))
 
     @property
     def size(self) -> tuple[int, int]:
@@ -260,7 +265,7 @@ class Fires:
         return EmberGround(
             fuel=self.fuel,
             heads=lambda number, window: self.planes(number, window)[:, _HEAD:],
-            air=lambda number, window: air_in(self.fire, self.landscape, self.spells[number], window),
+            air=lambda number, window: air_in(self.fire, self.landscape, self.spells[number], window, self.cell_size),
             groups=self.groups,
             by_code=self.fire.bed.table is None,
             cell_size=self.cell_size,

@@ -10,7 +10,7 @@ from torch import Tensor
 from warp_torchrl.world.air.hills import bent
 from warp_torchrl.world.backends.spells import Highest, on_strips
 from warp_torchrl.world.behaviour.moistures import in_force, moisture_row
-from warp_torchrl.world.fires.spell import BUT_FASTEST, Spell, rise_of, spread_in
+from warp_torchrl.world.fires.spell import BUT_FASTEST, Spell, in_sun, rise_of, spread_in
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.state.window import Window
@@ -53,6 +53,7 @@ class RowsOfMap:
         else:
             each = [spell.here(wind, moisture, window) for window in self.windows]
             air, moisture = torch.cat([one[0] for one in each], dim=2), torch.cat([one[1] for one in each], dim=1)
+        moisture = in_sun(spell, moisture, self.ground, self.rise)
         return fire.bed.spread(self.ground, bent(air, self.ground), moisture, cell_size, self.rise).head[0]
 
 

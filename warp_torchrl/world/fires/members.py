@@ -12,6 +12,7 @@ from warp_torchrl.world.behaviour.firebrands import Firebrands
 from warp_torchrl.world.behaviour.moistures import MOISTURES, in_force, moisture_row
 from warp_torchrl.world.ensemble.parameters import PARAMETERS, Deviations
 from warp_torchrl.world.fires.alone import AT_ONCE, Fires
+from warp_torchrl.world.fires.pieces import gust_factors
 from warp_torchrl.world.fires.sectors import SECTORS, STOPPED, sectors_about
 from warp_torchrl.world.fires.spell import Spell, can_ignite, spread_in
 from warp_torchrl.world.law.rate import RateFire
@@ -34,12 +35,14 @@ class Members:
         local: Factor on the rates in each sector, float32 [K, S]; None is 1.
         held: Sectors in which a member does not advance, bool [K, S]; None: it does in all.
         sector: The sector of each cell, int64 [H, W]; None where nothing differs by sector.
+        gusts: Keys by which each draws its wind in spells with a ``block``, int64 [K]; None: none does.
     """
 
     values: Tensor
     local: Tensor | None = None
     held: Tensor | None = None
     sector: Tensor | None = None
+    gusts: Tensor | None = None
 
     @classmethod
     def drawn(cls, key: Tensor, deviations: Deviations, lit: Tensor) -> "Members":
@@ -106,7 +109,8 @@ class Members:
     def part(self, members: slice | Tensor) -> "Members":
         """Return some of the members, or all in another order."""
         local, held = (None if each is None else each[members] for each in (self.local, self.held))
-        return Members(self.values[members], local, held, self.sector)
+        gusts = None if self.gusts is None else self.gusts[members]
+        return Members(self.values[members], local, held, self.sector, gusts)
 
     def stopped(self, arrival: Tensor) -> Tensor:
         """Return times of arrival where sectors are held, float32 [K, H, W], of members in which none was."""
@@ -166,7 +170,8 @@ class Members:
             in_paces: Whether the members stand ``by_pace``, and each group of them takes ticks as short as it needs.
             later: See ``Fires``.
         """
-        met = spells if not bool(self.values[:, 1:].any()) else [self._spell(fire, spell) for spell in spells]
+        differ = self.gusts is not None or bool(self.values[:, 1:].any())
+        met = [self._spell(fire, spell) for spell in spells] if differ else spells
         rate = self._rates()
         return Fires(
             fire=fire,
@@ -207,11 +212,18 @@ class Members:
     def _spell(self, fire: RateFire, spell: Spell) -> Spell:
         """Return a spell with the wind and the moisture of each member."""
         moisture = in_force(spell.moisture, moisture_row(fire.moisture))
-        winds, moistures = self.winds(spell.wind), self.moistures(moisture)
+        winds, moistures = self._blown(spell), self.moistures(moisture)
         strongest = winds[winds.square().sum(1).argmax()]
         driest = moisture.clone()
         driest[:_DEAD], driest[_FFMC] = moistures[:, :_DEAD].amin(0), moistures[:, _FFMC].max()
         return replace(spell, wind=winds, moisture=moistures, fastest=replace(spell, wind=strongest, moisture=driest))
+
+    def _blown(self, spell: Spell) -> Tensor:
+        """Return each member's wind in a spell, in its gusts where it has some, float32 [K, 2] [m/s]."""
+        winds = self.winds(spell.wind)
+        if self.gusts is None or spell.block is None:
+            return winds
+        return winds * gust_factors(self.gusts, spell)[:, None]
 
     def winds(self, wind: Tensor) -> Tensor:
         """Return each member's wind, float32 [K, 2] [m/s], from (u east, v north), float32 [2]."""

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from warp_torchrl.world.air.fields import Field
 from warp_torchrl.world.air.hills import FACTORS, bent
+from warp_torchrl.world.air.sunlight import Sunlight
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.behaviour.moistures import in_force, moisture_row
 from warp_torchrl.world.behaviour.spread import Spread
@@ -33,6 +34,10 @@ class Spell:
     moisture: Tensor | None = None  # float32 [7] or [G, 7], in the order of ``moistures.MOISTURES``, NaN where unknown
     fastest: "Spell | None" = None  # weather that sets the ticks where groups differ
     field: Field | None = None  # how it differs by place; None: nowhere
+    sunlight: Sunlight | None = None  # how dead fuel differs by aspect, slope and shade; None: nowhere
+    gust: float = 1.0  # gusts over the mean wind
+    block: int | None = None  # number of the draw of its wind between mean and gust; None: the mean
+    young: tuple[float, float] | None = None  # minutes since ignition of a fire that accelerates; None: it does not
 
     @property
     def groups(self) -> int:
@@ -60,7 +65,7 @@ class Spell:
 def spells_of(air: Weather, minutes: float, start: float = 0.0) -> list[Spell]:
     """Return the spells of some minutes of weather, from some minutes after its first row began."""
     return [
-        Spell(wind, lasts, moisture, field=air.by_place(row))
+        Spell(wind, lasts, moisture, field=air.by_place(row), sunlight=air.in_sun(row), gust=air.gust(row))
         for row, wind, moisture, lasts in air.spells(minutes, start)
     ]
 
@@ -76,10 +81,12 @@ def spread_in(
     ground, rise = landscape, None
     if window is not None:
         ground, rise = window.landscape(landscape), rise_of(landscape, window, cell_size)
+    if spell.sunlight is not None and rise is None:
+        rise = gradient(landscape.elevation, landscape.cover, cell_size)
     at_once = max(1, _SPREAD_AT_ONCE // ground.cover.numel())
     place = Window.whole((landscape.cover.shape[1], landscape.cover.shape[2])) if window is None else window
     parts = [
-        fire.bed.spread(ground, bent(air, ground), moist, cell_size, rise)
+        fire.bed.spread(ground, bent(air, ground), in_sun(spell, moist, ground, rise), cell_size, rise, spell.young)
         for air, moist in (
             spell.here(*each, place) for each in zip(winds.split(at_once), moistures.split(at_once), strict=True)
         )
@@ -87,11 +94,15 @@ def spread_in(
     return parts[0] if len(parts) == 1 else _joined(parts)
 
 
-def air_in(fire: RateFire, landscape: Landscape, spell: Spell, window: Window) -> tuple[Tensor, Tensor]:
+def air_in(
+    fire: RateFire, landscape: Landscape, spell: Spell, window: Window, cell_size: float
+) -> tuple[Tensor, Tensor]:
     """Return winds [G, 2, 1, 1] or [G, 2, h, w] [m/s] and moistures [G, 7] or [G, h, w, 7] [%] in a window."""
     winds, row = spell.wind.reshape(-1, 2), moisture_row(fire.moisture)
     moistures = in_force(spell.moisture, row).reshape(-1, len(row)).expand(len(winds), -1)
     air, moist = spell.here(winds, moistures, window)
+    if spell.sunlight is not None:
+        moist = in_sun(spell, moist, window.landscape(landscape), rise_of(landscape, window, cell_size))
     return (air if landscape.layer(FACTORS[0]) is None else bent(air, window.landscape(landscape))), moist
 
 
@@ -109,6 +120,14 @@ def heads(spread: Spread, with_kind: bool = False) -> Tensor:
     """Return the fields of ``HeadBehaviour`` for a spread [G, h, w], float32 [G, 4, h, w]; 5 with the kind of fire."""
     then, kind = head_behaviour(spread), (spread.kind,) if with_kind else ()
     return torch.stack((then.head, then.backing, then.intensity, then.flame_length, *kind), dim=1)
+
+
+def in_sun(spell: Spell, moisture: Tensor, ground: Landscape, rise: Tensor | None) -> Tensor:
+    """Return moistures [G, 7] or [G, h, w, 7] by aspect, slope and shade, [G, h, w, 7]."""
+    if spell.sunlight is None or rise is None:
+        return moisture
+    moisture = moisture[:, None, None] if moisture.dim() == 2 else moisture
+    return moisture * spell.sunlight.factors(rise, ground.layer("canopy_cover"))
 
 
 def rise_of(landscape: Landscape, window: Window, cell_size: float) -> Tensor:

@@ -12,6 +12,7 @@ from torch.nn.functional import pad
 from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.batch import Named
 from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.behaviour.acceleration import OPEN, mean_share, slowed
 from warp_torchrl.world.behaviour.crown import (
     FOLIAR_MOISTURE,
     KILOJOULES_PER_KG,
@@ -19,7 +20,9 @@ from warp_torchrl.world.behaviour.crown import (
     Surroundings,
     with_crowns,
 )
+from warp_torchrl.world.behaviour.fbp import FOLIAR_MOISTURE as FBP_FOLIAR_MOISTURE
 from warp_torchrl.world.behaviour.fbp import fbp_spread
+from warp_torchrl.world.behaviour.fbp_fuels import CURING
 from warp_torchrl.world.behaviour.fuel_codes import read_model
 from warp_torchrl.world.behaviour.fuel_models import FuelTable
 from warp_torchrl.world.behaviour.moistures import MOISTURES, in_force
@@ -53,7 +56,12 @@ class FuelBed:
     wind_gain: float
     slope_gain: float
     crown: CrownModel = "cruz"
-    foliar_moisture: float = FOLIAR_MOISTURE
+    foliar_moisture: float | None = None
+    curing: float = CURING
+    green: bool = False
+    percent_conifer: float = 50.0
+    percent_dead_fir: float = 35.0
+    grass_load: float = 0.35
     by_cover: bool = False  # the codes of landscapes are no fuels
 
     def __post_init__(self) -> None:
@@ -92,7 +100,13 @@ class FuelBed:
         return table.index_select(0, landscape.cover.flatten().to(torch.int32)).view(landscape.cover.shape)
 
     def spread(
-        self, landscape: Landscape, wind: Tensor, moisture: Tensor, cell_size: float, rise: Tensor | None = None
+        self,
+        landscape: Landscape,
+        wind: Tensor,
+        moisture: Tensor,
+        cell_size: float,
+        rise: Tensor | None = None,
+        young: tuple[float, float] | None = None,
     ) -> Spread:
         """Return what a fire's head does in each cell, float32 [B, H, W] each; rates on the map, not along the ground.
 
@@ -102,6 +116,8 @@ class FuelBed:
             moisture: In the order of ``MOISTURES``, float32 [B, 7], or by cell [B, H, W, 7].
             cell_size: Side of a cell [m].
             rise: How steeply the ground rises, see ``gradient``; None makes it of the landscapes' elevation.
+            young: Minutes since ignition over which the spread is the mean of a fire that accelerates; None: it is
+                steady.
         """
         rise = gradient(landscape.elevation, landscape.cover, cell_size) if rise is None else rise
         rise = rise * self.slope_gain
@@ -114,7 +130,7 @@ class FuelBed:
         }
         fuel = self.fuel(landscape)
         if self.table is None:
-            spread = self._canadian(fuel, moisture, **air)
+            spread = self._canadian(fuel, moisture, young, **air)
         else:
             table = _on(self.table, fuel.device)
             factor = to_midflame(table.fuels.depth[table.index(fuel)], landscape)
@@ -122,6 +138,7 @@ class FuelBed:
             spread = self._rothermel(fuel, moisture, **midflame)
             spread = self._with_crowns(spread, landscape, moisture, **air)
             spread = replace(spread, head=spread.head * _on_map(spread.direction, rise))
+            spread = spread if young is None else slowed(spread, mean_share(OPEN, *young))
         factor = self._factor(fuel)
         return replace(
             spread,
@@ -134,6 +151,7 @@ class FuelBed:
         self,
         fuel: Tensor,
         moisture: Tensor,
+        young: tuple[float, float] | None = None,
         *,
         wind_speed: Tensor,
         wind_bearing: Tensor,
@@ -149,6 +167,13 @@ class FuelBed:
             aspect=aspect,
             ffmc=codes["ffmc"],
             bui=codes["bui"],
+            curing=self.curing,
+            percent_conifer=self.percent_conifer,
+            percent_dead_fir=self.percent_dead_fir,
+            grass_load=self.grass_load,
+            green=self.green,
+            foliar_moisture=FBP_FOLIAR_MOISTURE if self.foliar_moisture is None else self.foliar_moisture,
+            young=young,
         )
 
     def _rothermel(self, fuel: Tensor, moisture: Tensor, **air: Tensor) -> Spread:
@@ -177,7 +202,7 @@ class FuelBed:
             canopy,
             Surroundings(**air, moisture=_of_cells(moisture)[..., :5]),
             heat=table.fuels.heat[table.index(fuel)] * KILOJOULES_PER_KG,
-            foliar_moisture=self.foliar_moisture,
+            foliar_moisture=FOLIAR_MOISTURE if self.foliar_moisture is None else self.foliar_moisture,
             model=self.crown,
             gain=self._factor(fuel),
         )
@@ -193,7 +218,8 @@ class FuelBed:
         fuel = self.fuel(landscape)
         codes = torch.arange(int(fuel.min()), int(fuel.max()) + 1, device=fuel.device)
         zero = torch.zeros(1, 1, 1, device=fuel.device)
-        air = {"wind_speed": zero + _REFERENCE_WIND, "wind_bearing": zero, "slope": zero, "aspect": zero}
+        air: dict[str, Any] = {"wind_speed": zero + _REFERENCE_WIND}
+        air |= dict.fromkeys(("wind_bearing", "slope", "aspect"), zero)
         rule = self._canadian if self.table is None else self._rothermel
         rates = rule(codes[None, None], moisture[None].to(fuel.device), **air)
         share = (rates.head / rates.head.max().clamp(min=1e-6)).sqrt()[0, 0]

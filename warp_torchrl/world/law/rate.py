@@ -13,7 +13,8 @@ from warp_torchrl.validation import check_fields
 from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.geometry import grow, neighbour_in
 from warp_torchrl.world.arrays.random import Stream, log_deviation, uniform, uniform_at
-from warp_torchrl.world.behaviour.crown import FOLIAR_MOISTURE, CrownModel
+from warp_torchrl.world.behaviour.crown import CrownModel
+from warp_torchrl.world.behaviour.fbp_fuels import CURING
 from warp_torchrl.world.behaviour.moistures import fine_moisture, in_force, moisture_row
 from warp_torchrl.world.behaviour.spread import Spread
 from warp_torchrl.world.law import arrivals
@@ -61,7 +62,16 @@ class RateFire(Automaton):
         slope_gain: Factor on the slope's tangent.
         crown: Rule of the rate of crown fire in Rothermel's fuels, ``cruz`` or ``rothermel`` (see ``behaviour.crown``),
             where the landscape has canopy cover, height, base height and bulk density; ``none`` for surface fire alone.
-        foliar_moisture: Water in the needles of crowns [% of dry weight].
+        foliar_moisture: Water in the needles of crowns [% of dry weight]; None takes 100 in Rothermel's fuels and 97 in
+            Canadian ones.
+        curing: Cured grass of the Canadian O-1 [%]; None takes 80. Of Rothermel's fuels ``moisture.live_herbaceous``
+            says it.
+        green: Whether the leaves of aspen are out in Canadian fuels: whether 13 is D-2, 60 M-2 and 90 M-4; None: no.
+        percent_conifer: Conifers in the Canadian M-1 and M-2 whose code does not say it [%].
+        percent_dead_fir: Dead balsam fir in the Canadian M-3 and M-4 whose code does not say it [%].
+        grass_load: Fuel in Canadian grass [kg/m2].
+        acceleration: Whether fires from a point take time to reach their rates (see ``behaviour.acceleration``).
+            Predictions and calibrations read it; worlds that step refuse it.
         cell_deviation: Coefficient of variation of the rates from cell to cell.
         fire_deviation: Coefficient of variation of the rates from fire to fire.
 
@@ -82,7 +92,13 @@ class RateFire(Automaton):
     wind_gain: float = 1.0
     slope_gain: float = 1.0
     crown: CrownModel = "cruz"
-    foliar_moisture: float = FOLIAR_MOISTURE
+    foliar_moisture: float | None = None
+    curing: float | None = None
+    green: bool | None = None
+    percent_conifer: float = 50.0
+    percent_dead_fir: float = 35.0
+    grass_load: float = 0.35
+    acceleration: bool = False
     cell_deviation: float = 0.1
     fire_deviation: float = 0.0
     _by_cover: bool = field(default=False, init=False, repr=False)
@@ -98,6 +114,10 @@ class RateFire(Automaton):
             wind_gain=(0.0, 10.0),
             slope_gain=(0.0, 10.0),
             foliar_moisture=(20.0, 400.0),
+            curing=(0.0, 100.0),
+            percent_conifer=(0.0, 100.0),
+            percent_dead_fir=(0.0, 100.0),
+            grass_load=(0.0, 100.0),
             cell_deviation=(0.0, 2.0),
             fire_deviation=(0.0, 2.0),
         )
@@ -136,6 +156,11 @@ class RateFire(Automaton):
             slope_gain=self.slope_gain,
             crown=self.crown,
             foliar_moisture=self.foliar_moisture,
+            curing=CURING if self.curing is None else self.curing,
+            green=bool(self.green),
+            percent_conifer=self.percent_conifer,
+            percent_dead_fir=self.percent_dead_fir,
+            grass_load=self.grass_load,
             by_cover=self._by_cover,
         )
 
@@ -165,6 +190,10 @@ class RateFire(Automaton):
         """Return the law under which fires differ from cell to cell alone."""
         return replace(self, fire_deviation=0.0)._going_by(self._by_cover)
 
+    def with_state(self, **state: Any) -> Self:
+        """Return the law with another state of its fuel: ``curing``, ``green``, ``foliar_moisture``."""
+        return replace(self, **state)._going_by(self._by_cover)
+
     def _going_by(self, cover: bool) -> Self:
         """Return the law that takes the fuel of the cover, or of the landscape's codes."""
         law = replace(self)
@@ -178,6 +207,8 @@ class RateFire(Automaton):
         Raises:
             ValueError: See ``on``.
         """
+        if self.acceleration:
+            raise ValueError("fire.acceleration must be false in worlds that step: warp predict and calibrate read it")
         law = self.on(landscape)
         if law.minutes_per_tick is not None:
             return law

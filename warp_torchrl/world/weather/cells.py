@@ -1,11 +1,12 @@
 """Numbers in the cells of a table of weather: missing values, calm winds, points of the compass, traces of rain."""
 
+import math
 from collections.abc import Sequence
 
 from warp_torchrl.system.delimited import to_number, to_points
 from warp_torchrl.world.weather.columns import Column
 from warp_torchrl.world.weather.layout import Sheet
-from warp_torchrl.world.weather.quantities import QUANTITIES
+from warp_torchrl.world.weather.quantities import ASKED, QUANTITIES
 from warp_torchrl.world.weather.units import ascii_text
 
 _MISSING = frozenset("m na n/a nan null none nil missing - -- --- n/d s/d * ** *** .".split())
@@ -31,13 +32,19 @@ def is_missing(cell: str) -> bool:
 def column_values(name: str, column: Column, sheet: Sheet) -> list[float] | None:
     """Return a column's values in our unit; None if all cells are empty and the quantity is optional.
 
+    Of ``ASKED`` quantities a missing cell is NaN.
+
     Raises:
         ValueError: If a cell is missing, no number, or out of the quantity's range, with the row.
     """
     cells = _cells(column, sheet)
     if name not in ("wind_speed", "wind_u", "wind_v") and all(is_missing(cell) for cell in cells):
         return None
-    values = [_value(name, column, cell, row) for row, cell in enumerate(cells, 1)]
+    may_lack = name in ASKED
+    values = [
+        math.nan if may_lack and is_missing(cell) else _value(name, column, cell, row)
+        for row, cell in enumerate(cells, 1)
+    ]
     if name == "humidity" and column.unit == "%" and 0.0 < max(values) <= 1.0:
         raise ValueError(
             f"{column.header} must be in per cent, or say units.humidity=fraction, got {max(values):g} at most"

@@ -13,11 +13,11 @@ read.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from warp_torchrl.validation import did_you_mean
-from warp_torchrl.world.weather.quantities import OWNER, QUANTITIES, SHOWN_NAMES, STATED
+from warp_torchrl.world.weather.quantities import ASKED, OWNER, QUANTITIES, SHOWN_NAMES, STATED
 from warp_torchrl.world.weather.sources import Source, find_source
 from warp_torchrl.world.weather.units import SPEED, Units, ascii_text, unit_of, without_unit
 
@@ -109,7 +109,7 @@ def _is_at(height: str | None, quantity: str) -> bool:
     """Return whether a height is one at which a quantity is read."""
     if height is None or quantity in ("wind_u", "wind_v"):
         return True
-    if quantity in ("wind_speed", "wind_bearing"):
+    if quantity in ("wind_speed", "wind_bearing", "wind_gust"):
         return height in _WIND_HEIGHTS
     return height in ("1m", "2m")
 
@@ -124,6 +124,7 @@ def find_columns(
     rows: Sequence[Sequence[str]] = (),
     below: Sequence[str] = (),
     given_units: Mapping[str, str] | None = None,
+    asked: Collection[str] = (),
 ) -> tuple[dict[str, Column], Source | None]:
     """Return the column of each quantity in a table, and the source whose names it has.
 
@@ -132,6 +133,7 @@ def find_columns(
         rows: The rows below it, by which names of RAWS are recognised.
         below: Units in a row below the names, empty without one.
         given_units: Units by quantity or header, given by the user.
+        asked: Those of ``ASKED`` that are read.
 
     Raises:
         ValueError: If a quantity has two columns, no unit or one that is not known, or the wind has no column.
@@ -142,12 +144,13 @@ def find_columns(
         heads = [replace(head, quantity=source.names.get(head.name, head.quantity)) for head in heads]
     places = {name: _places(name, heads) for name in QUANTITIES}
     _check_wind(places, heads)
-    for name in _unread(places):
+    for name in (*_unread(places), *(name for name in ASKED if name not in asked)):
         places[name] = []
     said = _said(given_units or {}, heads)
-    found = {}
+    found: dict[str, Column] = {}
     for name, at in places.items():
-        columns = [_column(name, heads[k], k, below, said, source) for k in at]
+        usual = found["wind_speed"].unit if name == "wind_gust" and "wind_speed" in found else QUANTITIES[name].usual
+        columns = [_column(name, heads[k], k, below, said, source, usual) for k in at]
         if len({(column.unit, column.height) for column in columns}) < len(columns):
             raise ValueError(f"weather must have one column of {name}, got {', '.join(headers[k] for k in at)}")
         if columns:
@@ -204,7 +207,13 @@ def _said(given_units: Mapping[str, str], heads: Sequence[ColumnHeader]) -> dict
 
 
 def _column(
-    name: str, head: ColumnHeader, place: int, below: Sequence[str], said: Mapping[str, str], source: Source | None
+    name: str,
+    head: ColumnHeader,
+    place: int,
+    below: Sequence[str],
+    said: Mapping[str, str],
+    source: Source | None,
+    usual: str | None,
 ) -> Column:
     quantity = QUANTITIES[name]
     stated = [each for each in (head.unit, _below(below, place)) if each is not None]
@@ -214,7 +223,7 @@ def _column(
         others = f"units.{name}={said[name]}" if len(set(stated)) == 1 else f"{stated[1]} in the row below it"
         raise ValueError(f"{head.text} must have one unit, it says {stated[0]} and {others}")
     unit = stated[0] if stated else said.get(name)
-    unit = unit or (source.units.get(name) if source else None) or quantity.usual
+    unit = unit or (source.units.get(name) if source else None) or usual
     if unit is None or unit not in quantity.units:
         raise ValueError(
             f"{head.text} must name its unit ({_listed(quantity.units)}), as in {name} [{quantity.unit}], got "

@@ -106,6 +106,17 @@ QUANTITIES = {
         "mm",
         of.RAIN,
     ),
+    "wind_gust": _quantity(
+        """
+        gust gusts windgust windgusts wgust wgst gustspeed gustspd windgustspeed windgustspd hourlywindgustspeed ggst
+        i10fg fg10 instantaneous10mwindgust 10mwindgustsincepreviouspostprocessing wpgt
+        rafaga rajada rafale raffica windboe
+        """,
+        (0, 150),
+        "m/s",
+        of.SPEED,
+    ),
+    "cloud": _quantity("cloudcover cloudcov cloud clouds totalcloudcover tcc skycover", (0, 100), "%", of.SHARE, "%"),
     "wind_u": _quantity("u10 u10m 10mucomponentofwind windu ucomponentofwind", (-100, 100), "m/s", of.SPEED),
     "wind_v": _quantity("v10 v10m 10mvcomponentofwind windv vcomponentofwind", (-100, 100), "m/s", of.SPEED),
     "ffmc": _quantity("hffmc / ffmc finefuelmoisturecode", (0, 101), "", of.NONE, ""),
@@ -116,6 +127,8 @@ QUANTITIES = {
     **{f"live_{what}": _quantity(f"live{what}", (0, 600), "%", of.SHARE, "%") for what in ("herbaceous", "woody")},
 }
 """By the name of a field; dew point and components of the wind become others."""
+ASKED = ("wind_gust", "cloud")
+"""Quantities that are read where something needs them; a cell of theirs may be missing."""
 OWNER = {each: name for name, quantity in QUANTITIES.items() for tier in quantity.names for each in tier}
 """The quantity that a name is one of."""
 STATED = {"sknt": "kt", "p01i": "in", "airtc": "c", "intensidadeventokm": "km/h"}

@@ -1,7 +1,7 @@
 """Hourly weather: a table read from a CSV file, with fuel moistures computed from it."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Literal, cast
@@ -46,6 +46,8 @@ class WeatherValues:
     dead_100h: Tensor | None = None  # [per cent]
     live_herbaceous: Tensor | None = None  # [per cent]
     live_woody: Tensor | None = None  # [per cent]
+    wind_gust: Tensor | None = None  # at wind_height [m/s]; NaN in a row without one
+    cloud: Tensor | None = None  # sky that clouds cover [per cent]; NaN in a row without one
     wind_height: WindHeight = "10m"
 
 
@@ -54,6 +56,8 @@ class WeatherTable(WeatherValues):
     """Weather row by row; every tensor float32 [T]. A row holds until the next begins, the last one from then on."""
 
     hours: Tensor  # since the first row began, growing
+    began: float | None = None  # hours from 1970 to the first row on the rows' clock; None without a date
+    zone: float | None = None  # hours that this clock is ahead of UTC; None where nothing says it
 
     def at(self, minutes: Tensor | float) -> WeatherValues:
         """Return the weather at some minutes since the first row began, in their shape; before, the first row holds."""
@@ -71,6 +75,7 @@ def read_weather(
     start_ffmc: float = 85.0,
     bui: float | None = None,
     units: Mapping[str, str] | None = None,
+    asked: Collection[str] = (),
 ) -> WeatherTable:
     """Return the weather of a file, one row per hour or at the rows' times.
 
@@ -86,6 +91,7 @@ def read_weather(
         start_ffmc: Fine fuel moisture code an hour before the first row, for a file without FFMC.
         bui: Buildup index of every row, for a file without BUI, DMC and DC; None leaves it unknown.
         units: Unit by quantity or column, where the file states none; of ``datetime`` the order of its dates.
+        asked: ``wind_gust``, ``cloud``: read too, where the file has them.
 
     Raises:
         ValueError: In one line, with the file, the column and the row (the first under the header is 1): if the file
@@ -100,7 +106,7 @@ def read_weather(
     sheet = read_sheet(path)
     try:
         sheet, clock = _in_time(sheet, units or {})
-        columns, source = find_columns(sheet.headers, sheet.rows, sheet.below, units)
+        columns, source = find_columns(sheet.headers, sheet.rows, sheet.below, units, asked)
         known, read = _known(columns, sheet)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
@@ -109,7 +115,7 @@ def read_weather(
     hours = torch.tensor(clock.hours, dtype=torch.float32)
     tensors = {name: torch.tensor(values, dtype=torch.float32) for name, values in known.items()}
     made = _complete(tensors, hours, height, start_ffmc, bui)
-    return WeatherTable(hours=hours, wind_height=height, **made)
+    return WeatherTable(hours=hours, wind_height=height, began=_began(clock), zone=_zone(clock, sheet, source), **made)
 
 
 def minutes_until(
@@ -139,9 +145,25 @@ def minutes_until(
         _, source = find_columns(sheet.headers, sheet.rows, sheet.below, units)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    stated = [zone_of(column) for column in clock.columns]
-    zones = [zone for zone in (*stated, sheet.zone, source.zone if source else None) if zone is not None]
-    return 60.0 * hours_until(moment, clock, zones[0] if zones else zone, name)
+    stated = _stated_zone(clock, sheet, source)
+    return 60.0 * hours_until(moment, clock, zone if stated is None else stated, name)
+
+
+def _stated_zone(clock: Clock, sheet: Sheet, source: Source | None) -> float | None:
+    """Return the hours that rows without offsets are ahead of UTC, where names or documents say it."""
+    stated = (*(zone_of(column) for column in clock.columns), sheet.zone, source.zone if source else None)
+    return next((zone for zone in stated if zone is not None), None)
+
+
+def _zone(clock: Clock, sheet: Sheet, source: Source | None) -> float | None:
+    """Return the hours that the clock of ``began`` is ahead of UTC: rows with offsets are converted to UTC."""
+    return _stated_zone(clock, sheet, source) if None in clock.offsets else 0.0
+
+
+def _began(clock: Clock) -> float | None:
+    """Return the hours from 1970 to the first row; None without a date, or where it can be read in two ways."""
+    first = {moments[0] for moments in clock.moments.values()}
+    return first.pop() if len(first) == 1 else None
 
 
 def _in_time(sheet: Sheet, units: Mapping[str, str]) -> tuple[Sheet, Clock]:
