@@ -1,8 +1,8 @@
 """Speed, calibration of scenarios and checks of fires: ``warp benchmark WHAT``.
 
-WHAT is tick, env, train, scaling, tasks, rewards, generalist, fires, ellipses, predict, twins, witness or beliefs;
-several run one after the other. gpu runs alone: it measures everything on a card in under five minutes, and writes it
-to a file.
+WHAT is tick, env, train, scaling, tasks, attack, rewards, generalist, fires, ellipses, predict, twins, witness or
+beliefs; several run one after the other. gpu runs alone: it measures everything on a card in under five minutes, and
+writes it to a file.
 """
 
 import argparse
@@ -17,6 +17,7 @@ from typing import Any
 
 import torch
 
+from warp_torchrl.benchmark.attack import AXES, POLICIES, SCENARIO, VALUES, attack_table, draw_attack, escapes
 from warp_torchrl.benchmark.beliefs import belief_table, draw_reliability, reliability
 from warp_torchrl.benchmark.environments import LARGE, environment_speed, rate_table
 from warp_torchrl.benchmark.fires import ellipse_errors, fire_table, law_times
@@ -113,6 +114,17 @@ def _tasks(options: Namespace) -> dict[str, Rows]:
     return {"tasks": [calibrate(name, options.device, options.episodes, options.set) for name in names]}
 
 
+def _attack(options: Namespace) -> dict[str, Rows]:
+    asked = {axis: getattr(options, axis) for axis in AXES if getattr(options, axis) is not None} or VALUES
+    rows = []
+    for name in options.scenario or [SCENARIO]:
+        policies = options.policies or POLICIES
+        rows += escapes(name, options.device, options.episodes, asked, policies, options.team, options.set)
+    if options.plot is not None:
+        draw_attack(rows, options.plot)
+    return {"attack": rows}
+
+
 def _rewards(options: Namespace) -> dict[str, Rows]:
     names = options.scenario or ["skirmish", "default"]
     return {"rewards": [rank_rewards(name, options.device, options.episodes, options.set) for name in names]}
@@ -172,6 +184,7 @@ _MEASURES = {
     "train": _train,
     "scaling": _scaling,
     "tasks": _tasks,
+    "attack": _attack,
     "rewards": _rewards,
     "generalist": _generalist,
     "fires": _fires,
@@ -189,6 +202,7 @@ _TABLES = {
     "scaling": growth_table,
     "tasks": task_table,
     "pairs": pair_table,
+    "attack": attack_table,
     "rewards": reward_table,
     "generalist": generalist_table,
     "fires": fire_table,
@@ -216,12 +230,20 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--repeats", type=whole(1, 1000), default=7, help="times that each speed is measured")
     parser.add_argument("--no-compile", action="store_true", help="for tick and env: leave what is compiled out")
     parser.add_argument(
-        "--plot", type=file_to_write, metavar="FILE.png", help="for scaling, generalist or beliefs: draw it"
+        "--plot", type=file_to_write, metavar="FILE.png", help="for scaling, attack, generalist or beliefs: draw it"
     )
     parser.add_argument("--episodes", type=whole(1, 4096), default=EPISODES)
     parser.add_argument(
-        "--policies", nargs="+", choices=HEURISTICS, metavar="NAME", help="for tasks: these heuristics, the last paired"
+        "--policies",
+        nargs="+",
+        choices=HEURISTICS,
+        metavar="NAME",
+        help="for attack and tasks: these heuristics, of tasks the last paired",
     )
+    parser.add_argument("--winds", type=float, nargs="+", help="for attack: m/s")
+    parser.add_argument("--minutes", type=float, nargs="+", help="for attack: until the vehicles come")
+    parser.add_argument("--vehicles", type=whole(1, 256), nargs="+", help="for attack: how many")
+    parser.add_argument("--team", metavar="RUN", help="for attack: a trained team beside, a run or a shipped policy")
     parser.add_argument("--policy", default="generalist", help="for generalist: a run folder, or a shipped policy")
     parser.add_argument(
         "--places", nargs="+", metavar="GROUP", help=f"for generalist: {', '.join(PLACES)}, ground, or one row"
