@@ -36,5 +36,5 @@ def headed(metric: Metric, title: str = "") -> str:
 
 
 def sign_of(metric: Metric) -> float:
-    """Return -1 for a metric of which less is better, else 1."""
+    """Return -1 for a metric that is better when it is less, else 1."""
     return -1.0 if metric.better == "less" else 1.0

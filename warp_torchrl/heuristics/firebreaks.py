@@ -28,7 +28,7 @@ def cells_to_clear(state: WorldState, world: World, clears: Tensor, effort: floa
     Args:
         state: The worlds.
         world: Their rules; S is its steps per tick.
-        clears: Agents that clear, bool [A], at least one; those that are not on the scene do not.
+        clears: Agents that clear, bool [A], at least one; absent ones do not.
         effort: Steps that one agent takes for a cell of the ring.
     """
     away = distance_from_fire(state, world).to(torch.int64)

@@ -148,7 +148,7 @@ def glow(state: WorldState, ground: SceneGround) -> tuple[tuple[float, float, fl
 
 
 def vehicles(state: WorldState, ground: SceneGround, flies: Tensor, facing: Tensor) -> Instances:
-    """Return the vehicles of world 0; those that are not on the scene have no size.
+    """Return the vehicles of world 0; absent ones have no size.
 
     Args:
         state: The worlds.

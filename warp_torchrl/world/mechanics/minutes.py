@@ -22,7 +22,7 @@ def check_minutes(world: Rules, name: str, given: float | None) -> None:
         given: Its value.
 
     Raises:
-        ValueError: If the law has minutes of its own.
+        ValueError: If the law has minutes already.
     """
     if given is not None and world.fire.minutes is not None:
         raise ValueError(

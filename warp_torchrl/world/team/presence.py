@@ -15,18 +15,18 @@ def on_scene(state: WorldState) -> Tensor | None:
 
 
 def those_there(state: WorldState, which: Tensor) -> Tensor:
-    """Return those of some vehicles, bool [A] or [B, A], that are on the scene."""
+    """Return the vehicles of a mask, bool [A] or [B, A], that are on the scene."""
     there = on_scene(state)
     return which if there is None else which & there
 
 
 def pairs_there(state: WorldState, pairs: Tensor) -> Tensor:
-    """Return those of some pairs, bool [B or 1, A, A], of which both are on the scene."""
+    """Return the pairs of a mask, bool [B or 1, A, A], with both vehicles on the scene."""
     there = on_scene(state)
     return pairs if there is None else pairs & there[:, :, None] & there[:, None, :]
 
 
 def staying(state: WorldState, action: Tensor) -> Tensor:
-    """Return actions, int64 [B, A], in which those that are not on the scene stay."""
+    """Return actions, int64 [B, A], in which absent vehicles stay."""
     there = on_scene(state)
     return action if there is None else torch.where(there, action, int(Action.STAY))

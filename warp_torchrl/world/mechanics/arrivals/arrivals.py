@@ -1,6 +1,6 @@
-"""Vehicles that join and leave: they come to a fire at times of their own, work, rest, and go.
+"""Vehicles that join and leave: each arrives at its time, works, rests, and leaves.
 
-A fire grows from its first minute and its crews come later, one after the other: which fires escape initial attack
+A fire grows from its first minute and its crews arrive later, one after the other: which fires escape initial attack
 follows from both (Fried and Fried 1996, "Simulating wildfire containment with realistic tactics", Forest Science 42).
 """
 
@@ -34,7 +34,7 @@ _HOUR = 60.0
 
 @dataclass(eq=False, repr=False)
 class Presence(Batch):
-    """Who is on the scene, and when who comes and goes."""
+    """The vehicles on the scene, and when each arrives and leaves."""
 
     present: Tensor  # bool [B,A], is on the scene
     arrives: Tensor  # float32 [B,A], when it first arrives, since the start of the episode [minutes]
@@ -95,7 +95,7 @@ class Arrivals(Mechanic):
         )
 
     def check(self, world: Rules) -> None:
-        """Check that the team can stay, and has those who are named.
+        """Check that the team can stay, and has the vehicles that are named.
 
         Raises:
             ValueError: If not.
@@ -117,7 +117,7 @@ class Arrivals(Mechanic):
                 raise ValueError(f"mechanics.arrivals.speeds must name each role with a station, got none for {role}")
 
     def begin(self, state: WorldState, world: Rules) -> WorldState:
-        """Return worlds at the start of an episode, in which those who come later wait where they will join."""
+        """Return worlds at the start of an episode, in which late vehicles wait where they will join."""
         entry, travel = self._ways(state, world.team)
         given = numbers(self._of_each(self.minutes, world.team, 0.0), travel.device)
         draws = normal(named_key(state.episode_key, self.name), 0, Stream.NAMED, (travel.shape[1],))
@@ -130,7 +130,7 @@ class Arrivals(Mechanic):
         return state.replace(vehicles=state.vehicles.replace(position=entry)).with_planes(self.name, presence)
 
     def masked(self, state: WorldState, mask: Tensor) -> Tensor:
-        """Return which actions are open, bool [B, A, actions]: to those that are not there, stay alone."""
+        """Return which actions are open, bool [B, A, actions]: to absent vehicles, stay alone."""
         stays = torch.arange(mask.shape[-1], device=mask.device) == int(Action.STAY)
         return torch.where(state.planes(self.name, Presence).present[..., None], mask, stays)
 
@@ -228,11 +228,11 @@ class Arrivals(Mechanic):
 
     @staticmethod
     def _of_each(told: Mapping[str, float], team: Team, otherwise: float) -> tuple[float, ...]:
-        """Return what a mapping tells of each vehicle, by its name or else its role."""
+        """Return the number of each vehicle in a mapping, by its name or else its role."""
         pairs = zip(team.agent_names, team.agent_roles, strict=True)
         return tuple(told.get(agent, told.get(role, otherwise)) for agent, role in pairs)
 
 
 def _comes(presence: Presence) -> Tensor:
-    """Return who is not there yet, or no longer, and will be, bool [B, A]."""
+    """Return the absent vehicles that will arrive, bool [B, A]."""
     return ~presence.present & (presence.until_there < NEVER)

@@ -1,4 +1,4 @@
-"""Where assets stand and what they are worth: of a raster, of a list, and drawn."""
+"""Places and worth of assets: of a raster, of a list, and drawn."""
 
 import torch
 from torch import Tensor

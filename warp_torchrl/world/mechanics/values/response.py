@@ -1,4 +1,4 @@
-"""What fires do to assets, and what vehicles cost: the tables of ``values``."""
+"""Losses of assets by flame length, and rates of vehicles: the tables of ``values``."""
 
 import torch
 from torch import Tensor

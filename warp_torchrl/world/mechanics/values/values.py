@@ -1,4 +1,4 @@
-"""What a fire is judged by: the worth of what stands, whether it escaped, when it was contained, and what it cost."""
+"""Measures of a fire: the worth that is left, whether it escaped, the minutes until it was contained, and its cost."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -136,7 +136,7 @@ class Values(Mechanic):
         return state.with_planes(self.name, exposure)
 
     def after_tick(self, state: WorldState, ticks_now: Tensor, world: Rules) -> WorldState:
-        """Return worlds whose assets were exposed to the flames and embers of a tick, in those that ticked."""
+        """Return worlds whose assets were exposed to the flames and embers of a tick, where one was."""
         return advance_rows(state, ticks_now, lambda rows, ticks: self._expose(rows, ticks, world))
 
     def step(self, before: WorldState, after: WorldState, running: Tensor, world: Rules) -> WorldState:
@@ -177,7 +177,7 @@ class Values(Mechanic):
             "contained": held.to(torch.float32),
             "contained_at": torch.where(held, exposure.grew, exposure.now),
             "fire_size": area,
-            "cost": exposure.cost,
+            "cost": exposure.cost.clone(),
         }
 
     def left(self, state: WorldState) -> Tensor:
