@@ -8,8 +8,12 @@ from tests.world.drawing import differing, drawn
 from tests.world.mechanics.drawing import begun
 from tests.world.mechanics.there import needs
 from warp_torchrl import load_policy, make_env
+from warp_torchrl.env.observation.critic import CriticState, reach_of_fire_and_team
+from warp_torchrl.env.pictures.render import render
+from warp_torchrl.env.reward.terms import _at_head, _surrounded
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.heuristics.base import claim_cells
+from warp_torchrl.heuristics.firebreaks import cells_to_clear
 from warp_torchrl.system.device import unread
 from warp_torchrl.world.air.wind import Calm
 from warp_torchrl.world.law.fire import Fire
@@ -65,6 +69,38 @@ def test_others_do_not_see_meet_or_reckon_with_who_is_not_there():
         state = world.step(state, torch.full((1, 3), STAY)).after
     known, _ = world.sensing.knows_where(state, world.team, world.hearing)
     assert known.sum() == 6 and nearest_mate(state)[0].tolist() == [1, 0, 1]
+
+
+def test_critic_pictures_and_rewards_leave_out_who_is_not_there():
+    world = rules(team=Team(n_agents=2, roles=("ugv", "uav")), arrivals=Arrivals(minutes={"uav": 20.0}))
+    field = " ".join(["T" * 24] * 11 + ["T" * 11 + "aa" + "T" * 11] * 2 + ["T" * 24] * 11)
+    state = at_start(world, (2, 2), (20, 20), drawing=field)
+    later = world.step(world.step(state, torch.full((1, 2), STAY)).after, torch.full((1, 2), STAY)).after
+    critic = CriticState(world)
+    of_each = [critic.names.index(role) for role in world.team.role_names]
+    counts = [critic(each, world.forecast(each))[0, of_each].sum((1, 2)).tolist() for each in (state, later)]
+    assert counts == [[1.0, 0.0], [1.0, 1.0]]
+    near, far = (reach_of_fire_and_team(each, world)[1][0, -1, -1].item() for each in (later, state))
+    assert near > 0.1 > 0.001 > far
+    flies = torch.tensor([False, True])
+    bare, drawing, both = (
+        render(each, who)[0, 200:, 200:] for each, who in ((state, None), (state, flies), (later, flies))
+    )
+    assert torch.equal(bare, drawing) and not torch.equal(render(later, None)[0, 200:, 200:], both)
+    assert [_surrounded(each).item() for each in (state, later)] == [1 / 8, 2 / 8]
+    calm = [
+        each.replace(air=each.air.replace(wind=torch.tensor([1.0, -1.0]).view(1, 2, 1, 1))) for each in (state, later)
+    ]
+    assert [_at_head(each).item() for each in calm] == [0.0, 0.5]
+
+
+def test_a_firebreak_is_planned_with_those_who_are_there():
+    world = rules(team=Team(n_agents=2, tank=0), steps_per_tick=8)
+    field = " ".join(["T" * 15] * 7 + ["T" * 7 + "a" + "T" * 7] + ["T" * 15] * 7)
+    state, clears = at_start(world, (6, 4), (14, 14), drawing=field), torch.tensor([True, True])
+    alone = cells_to_clear(state.without_planes("arrivals"), world, torch.tensor([True, False]), 2.0)
+    together = cells_to_clear(state.without_planes("arrivals"), world, clears, 2.0)
+    assert torch.equal(cells_to_clear(state, world, clears, 2.0), alone) and not torch.equal(together, alone)
 
 
 def test_agents_are_told_when_they_come_and_go_and_how_many_still_come():
