@@ -34,7 +34,8 @@ def written(folder, **changes):
 
 
 def test_a_sound_one_is_read_with_what_earlier_ones_left_out(tmp_path):
-    assert read_evaluation(written(tmp_path)) == {"goal": "saved", "world_overrides": [], **SOUND}
+    saved = {"goal": "saved", "goal_better": "more", "goal_unit": "%"}
+    assert read_evaluation(written(tmp_path)) == {**saved, "world_overrides": [], **SOUND}
 
 
 @pytest.mark.parametrize(
@@ -44,7 +45,9 @@ def test_a_sound_one_is_read_with_what_earlier_ones_left_out(tmp_path):
         ({"method": ["a"]}, "method must be a text"),
         ({"configuration": 7}, "configuration must be a text"),
         ({"world_overrides": [1]}, "world_overrides must be texts"),
-        ({"goal": "gold"}, "goal must be saved or watched, got 'gold'"),
+        ({"goal": "[gold](x)"}, "goal must name a metric, got '[gold](x)'"),
+        ({"goal_better": ""}, "goal_better must be one of more, less, got ''"),
+        ({"goal_unit": "acre"}, "goal_unit must be one of %, 1, min, ha, USD, got 'acre'"),
         ({"goal": "watched"}, "episodes must have watched"),
         ({"seeds": []}, "seeds must be 1 to 100000 whole numbers"),
         ({"seeds": [1, "2"]}, "seeds must be 1 to"),

@@ -8,6 +8,8 @@ from warp_torchrl.env.metrics import METRICS
 from warp_torchrl.evaluation.report import EXTRA_METRICS, MEANING, WATCHING, evaluation_table, report
 from warp_torchrl.world.mechanics.mechanic import Metric
 
+WATCHED = Metric("watched", "more")
+
 
 def episodes(watched, *further):
     return {
@@ -21,7 +23,7 @@ def episodes(watched, *further):
 
 
 def test_what_is_watched_has_a_table_of_its_own():
-    content = report("front", "mine", 7, episodes(0.75, *WATCHING), {"noop": episodes(0.25, *WATCHING)}, goal="watched")
+    content = report("front", "mine", 7, episodes(0.75, *WATCHING), {"noop": episodes(0.25, *WATCHING)}, goal=WATCHED)
     assert content["watching"]["noop"]["watched_difference"] == 0.5
     shown = evaluation_table(content).splitlines()
     assert "mine                        75.0    75.0 .. 75.0     50.0        0.250" in shown
@@ -30,7 +32,7 @@ def test_what_is_watched_has_a_table_of_its_own():
     acts = evaluation_table(report("search", "mine", 7, episodes(0.75, *WATCHING), {"noop": episodes(0.25, *WATCHING)}))
     assert "points saved" in acts and "points watched" in acts and "saved %" not in "".join(shown)
     lamed = {"scout_1": episodes(0.5, *WATCHING)}
-    alone = report("front", "mine", 7, episodes(0.75, *WATCHING), {}, left_out=lamed, goal="watched")
+    alone = report("front", "mine", 7, episodes(0.75, *WATCHING), {}, left_out=lamed, goal=WATCHED)
     assert "without scout_1          -25.0  -25.0 .. -25.0" in evaluation_table(alone).splitlines()
 
 
@@ -85,7 +87,7 @@ def test_the_words_of_a_table_are_explained_under_it():
     assert all(f"{title}: " in legend for title in titles[1:]) and set(MEANING) == set(EXTRA_METRICS)
     assert "averted                  0.000    0.000 .. 0.000  trees saved beyond those of noop, a share of all" in lines
     seen = episodes(0.75, *WATCHING)
-    watching = evaluation_table(report("front", "mine", 7, seen, {"noop": seen}, goal="watched"))
+    watching = evaluation_table(report("front", "mine", 7, seen, {"noop": seen}, goal=WATCHED))
     assert all(f"{title}: " in watching for title in WATCHING) and "saved: " not in watching
 
 
@@ -96,3 +98,18 @@ def test_elsewhere_it_has_none():
         and "watched" not in evaluation_table(content)
         and "agency" not in evaluation_table(content)
     )
+
+
+def test_a_goal_of_minutes_comes_first_and_fewer_are_better():
+    minutes = Metric("contained_at", "less", "min")
+    mine, other = (
+        episodes(0.0) | {"contained_at": np.array(each)}
+        for each in ([30.0, 30.0, 40.0, 40.0], [60.0, 60.0, 40.0, 40.0])
+    )
+    content = report("attack", "mine", 0, mine, {"noop": other}, left_out={"uav_0": other}, goal=minutes)
+    assert content["by_goal"]["noop"]["probability_of_improvement"] == 0.75
+    lines = evaluation_table(content, (minutes,)).splitlines()
+    assert "contained_at min" in lines[1] and re.search(r"mine +35.0 +30.0 .. 40.0", lines[3]), lines
+    assert re.fullmatch(r"mine - noop: -15.0 min contained_at, -\S+ .. \S+; less on 75 % of fires", lines[4]), lines[4]
+    assert re.match(r"without uav_0 +\+15.0 ", lines[-1]), lines[-1]
+    assert not any("contained_at" in line for line in lines[5:])

@@ -137,6 +137,22 @@ def test_teams_that_watch_are_compared_by_what_they_watch_in_a_table_of_their_ow
     assert second.split("|")[2] == " follower " and "| 60.0 |" in second
 
 
+def test_a_goal_of_which_less_is_better_is_shown_in_its_unit_and_the_least_comes_first(sweep, tmp_path, capsys):
+    for run, policy, minutes in (("5", "slow", (60.0, 90.0, 120.0)), ("6", "quick", (30.0, 90.0, 60.0))):
+        write(sweep / run, policy, [0.3, 0.3, 0.3], scenario="attack")
+        path = sweep / run / "evaluation.json"
+        content = json.loads(path.read_text())
+        for episode, value in zip(content["episodes"], minutes, strict=True):
+            episode["contained_at"] = value
+        path.write_text(json.dumps(content | {"goal": "contained_at", "goal_better": "less", "goal_unit": "min"}))
+    main([str(sweep)])
+    header, _, first, second = capsys.readouterr().out.split("\n\n")[1].splitlines()
+    assert "| contained_at min |" in header and first.split("|")[2] == " quick " and "| 60.0 |" in first
+    quick, slow = (row for row in read_rows(sweep) if row.scenario == "attack")
+    assert "| +30.0 |" in second and second.endswith("| 17 % |"), "equal on one of three"
+    draw_summary([quick, slow], tmp_path / "summary.png")
+
+
 def test_folders_without_evaluations_are_refused(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main([str(tmp_path)])

@@ -29,6 +29,7 @@ from warp_torchrl.system.signals import DeferredSignals, Stopped
 from warp_torchrl.training import loop
 from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.loop import Training
+from warp_torchrl.world.mechanics.mechanic import Metric
 
 TINY = [
     "landscape.size=12",
@@ -548,7 +549,7 @@ def test_a_policy_acts_in_the_mode_that_reaches_more_of_what_its_team_is_for(mon
     monkeypatch.setattr(loop, "play", played)
     plan = run_config(plain(compose_config("train", ["evaluation.episodes=2"])))
     for goal, mode in (("saved", "sampled"), ("watched", "deterministic")):
-        monkeypatch.setattr(loop, "goal", lambda world, goal=goal: goal)
+        monkeypatch.setattr(loop, "goal", lambda world, goal=goal: Metric(goal, "more"))
         assert Training._better_mode(SimpleNamespace(run_config=plan, learner=SimpleNamespace(policy=None))) == mode
 
 

@@ -1,4 +1,4 @@
-"""Metrics of an episode, numbers in 0..1: a table of functions by name, and the rows of the world's mechanics.
+"""Metrics of an episode: a table of functions by name, and the rows of the world's mechanics.
 
 A metric reads an ``Episode``. A module of a user's own adds one, which every world then has:
 
@@ -13,8 +13,8 @@ from typing import Literal, NamedTuple, TypeVar
 import torch
 from torch import Tensor
 
-from warp_torchrl.validation import check_new_name
-from warp_torchrl.world.mechanics.mechanic import Metric
+from warp_torchrl.validation import check_new_name, did_you_mean
+from warp_torchrl.world.mechanics.mechanic import Metric, Unit
 from warp_torchrl.world.state.state import TreeCounts, WorldState
 from warp_torchrl.world.world import World
 
@@ -45,7 +45,7 @@ METRICS: dict[str, Row] = {}
 
 
 def metric(
-    better: Literal["more", "less", ""] = "", unit: Literal["%", "1"] = "%", title: str = "", table: str = ""
+    better: Literal["more", "less", ""] = "", unit: Unit = "%", title: str = "", table: str = ""
 ) -> Callable[[Function], Function]:
     """Return what adds a function to the table, under the function's name; see ``Metric``.
 
@@ -65,6 +65,21 @@ def metric(
 def metric_rows(world: World) -> tuple[Metric, ...]:
     """Return the rows of a world's metrics: those of the table, then those of its mechanics."""
     return (*(row.metric for row in METRICS.values()), *(row for each in world.loop for row in each.metric_rows(world)))
+
+
+def chosen_goal(world: World) -> Metric | None:
+    """Return the metric that a world names as its goal; None where it names none.
+
+    Raises:
+        ValueError: If it is none of its metrics, or neither more nor less of it is better.
+    """
+    if world.goal is None:
+        return None
+    known = {row.name: row for row in metric_rows(world) if row.better}
+    if world.goal not in known:
+        hint = did_you_mean(world.goal, known)
+        raise ValueError(f"goal must be one of {', '.join(known)}, got {world.goal}{hint}")
+    return known[world.goal]
 
 
 def metrics(state: WorldState, counts: TreeCounts, world: World) -> dict[str, Tensor]:

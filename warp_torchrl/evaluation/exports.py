@@ -68,10 +68,10 @@ def _run(entry: SummaryRow, run: int, shared: Sequence[int], curve: tuple[np.nda
     by_step = dict(zip(steps.tolist(), values[run].tolist(), strict=True))
     last = entry.value[run].tolist()
     found: dict[str, Any] = {
-        f"step_{at}": {"step_count": step, entry.goal: [by_step[step]] if by_step else last}
+        f"step_{at}": {"step_count": step, entry.goal.name: [by_step[step]] if by_step else last}
         for at, step in enumerate(shared or [0])
     }
-    return {**found, "absolute_metrics": {entry.goal: last, "success": entry.success[run].tolist()}}
+    return {**found, "absolute_metrics": {entry.goal.name: last, "success": entry.success[run].tolist()}}
 
 
 def _shared_steps(found: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[int]:

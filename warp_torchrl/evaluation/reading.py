@@ -5,6 +5,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from warp_torchrl.evaluation.units import FORMS
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.destination import LARGEST_EVALUATION
 from warp_torchrl.system.foreign import Foreign, read_json
@@ -13,6 +14,7 @@ from warp_torchrl.system.foreign_text import plain_text
 _TEXTS = ("scenario", "method", "configuration")
 _LARGEST_NUMBER = 1e15
 _LONGEST = 200  # characters of a name
+_SAVED = {"goal": "saved", "goal_better": "more", "goal_unit": "%"}  # of files without a goal
 _MOST_EPISODES = 100_000
 
 
@@ -34,7 +36,7 @@ def read_evaluation(path: Path) -> dict[str, Any]:
     overrides = [plain_text(each, _LONGEST) for each in content.get("world_overrides", [])]
     baselines = content.get("baseline_episodes", {})
     named = {plain_text(name, _LONGEST): episodes for name, episodes in baselines.items()}
-    return {"goal": "saved", **content, **texts, "world_overrides": overrides, "baseline_episodes": named}
+    return {**_SAVED, **content, **texts, "world_overrides": overrides, "baseline_episodes": named}
 
 
 def _check(content: Any) -> None:
@@ -46,8 +48,11 @@ def _check(content: Any) -> None:
     overrides, goal = content.get("world_overrides", []), content.get("goal", "saved")
     if not (isinstance(overrides, list) and all(isinstance(each, str) for each in overrides)):
         raise ValueError("world_overrides must be texts")
-    if goal not in ("saved", "watched"):
-        raise ValueError(f"goal must be saved or watched, got {goal!r:.80}")
+    if not (isinstance(goal, str) and goal.isidentifier() and len(goal) <= _LONGEST):
+        raise ValueError(f"goal must name a metric, got {goal!r:.80}")
+    for key, known in (("goal_better", ("more", "less")), ("goal_unit", tuple(FORMS))):
+        if content.get(key, _SAVED[key]) not in known:
+            raise ValueError(f"{key} must be one of {', '.join(known)}, got {content[key]!r:.80}")
     seeds: Any = content.get("seeds")
     is_some = isinstance(seeds, list) and 0 < len(seeds) <= _MOST_EPISODES
     if not (is_some and all(type(seed) is int for seed in seeds)):

@@ -9,9 +9,10 @@ import numpy as np
 
 from warp_torchrl.env.specs import EPISODE_METRICS
 from warp_torchrl.evaluation.behaviour import BEHAVIOUR
-from warp_torchrl.evaluation.goal import Goal
+from warp_torchrl.evaluation.goal import SAVED
 from warp_torchrl.evaluation.play import Episodes
 from warp_torchrl.evaluation.statistics import compare, summarise
+from warp_torchrl.evaluation.units import FORMS, headed, sign_of, written
 from warp_torchrl.system import disk
 from warp_torchrl.world.mechanics.mechanic import Metric
 
@@ -53,7 +54,7 @@ def report(
     world_overrides: Sequence[str] = (),
     frames: int | None = None,
     trained: str = "",
-    goal: Goal = "saved",
+    goal: Metric = SAVED,
 ) -> dict[str, Any]:
     """Return the content of ``evaluation.json``.
 
@@ -88,14 +89,16 @@ def report(
         "configuration": configuration,
         "frames": frames,
         "trained": trained,
-        "goal": goal,
+        "goal": goal.name,
+        "goal_better": goal.better,
+        "goal_unit": goal.unit,
         "seeds": seeds,
         "metrics": _summaries(episodes),
         "episodes": rows,
         "versus": {name: compare(episodes["saved"], other["saved"]) for name, other in others.items()},
         "baselines": {name: _summaries(other) for name, other in others.items()},
         "baseline_episodes": {
-            name: {metric: other[metric].tolist() for metric in dict.fromkeys(("saved", "success", goal))}
+            name: {metric: other[metric].tolist() for metric in dict.fromkeys(("saved", "success", goal.name))}
             for name, other in others.items()
         },
         "other_modes": {name: _summaries(other) for name, other in (other_modes or {}).items()},
@@ -104,8 +107,15 @@ def report(
             for name, other in others.items()
             if "watched" in other
         },
-        "left_out": {agent: compare(episodes[goal], other[goal], goal) for agent, other in (left_out or {}).items()},
+        "by_goal": _compared(episodes, others, goal) if goal.name not in ("saved", "watched") else {},
+        "left_out": _compared(episodes, left_out or {}, goal),
     }
+
+
+def _compared(episodes: Episodes, others: Mapping[str, Episodes], goal: Metric) -> dict[str, dict[str, Any]]:
+    """Return the differences to other policies in what they are compared by."""
+    name, sign = goal.name, sign_of(goal)
+    return {other: compare(episodes[name], found[name], name, sign) for other, found in others.items()}
 
 
 def _summaries(episodes: Episodes) -> dict[str, dict[str, Any]]:
@@ -125,18 +135,39 @@ def evaluation_table(content: Mapping[str, Any], metrics: Sequence[Metric] = ())
     """
     lines = [f"{worlds_name(content)}: {len(content['seeds'])} fires, seeds from {content['seeds'][0]}"]
     rows = {**content["baselines"], **content["other_modes"], content["policy"]: content["metrics"]}
-    if content["goal"] == "saved":
-        lines += [*_saved_lines(rows), *_difference_lines(content["policy"], content["versus"], "saved")]
+    aim, policy = goal_of(content), content["policy"]
+    if aim.name not in ("saved", "watched"):
+        lines += [*_goal_lines(aim, rows), *_difference_lines(policy, content["by_goal"], aim)]
+    if aim.name != "watched":
+        lines += [*_saved_lines(rows), *_difference_lines(policy, content["versus"], SAVED)]
     if content["watching"]:
-        lines += [*_watching_lines(rows), *_difference_lines(content["policy"], content["watching"], "watched")]
-    shown = {*EPISODE_METRICS, *EXTRA_METRICS, *WATCHING}
+        lines += [*_watching_lines(rows), *_difference_lines(policy, content["watching"], Metric("watched", "more"))]
+    shown = {*EPISODE_METRICS, *EXTRA_METRICS, *WATCHING, aim.name}
     further = [metric for metric in metrics if metric.name not in shown]
     for title in dict.fromkeys(metric.table or metric.name for metric in further):
         lines += _metric_lines([metric for metric in further if title in (metric.table, metric.name)], rows)
-    lines += _behaviour_lines(content) if content["goal"] == "saved" else []
+    lines += _behaviour_lines(content) if aim.name != "watched" else []
     lines += _left_out_lines(content)
     lines += [f"trained: {content['trained']}"] if content["trained"] else []
     return "\n".join(lines)
+
+
+def goal_of(content: Mapping[str, Any]) -> Metric:
+    """Return what a report's policies are compared by."""
+    return Metric(content["goal"], content.get("goal_better", "more"), content.get("goal_unit", "%"))
+
+
+def _goal_lines(goal: Metric, rows: Mapping[str, Any]) -> list[str]:
+    """Return a line for each policy: what the worlds name as their goal."""
+    lines = [
+        f"{'policy':<22}{headed(goal):>22}{'95 % interval':>22}{'iqm':>10}  "
+        f"the goal of this scenario, {goal.better} is better"
+    ]
+    for name, summary in rows.items():
+        found = summary[goal.name]
+        interval = " .. ".join(written(bound, goal) for bound in found["ci95"])
+        lines.append(f"{name:<22}{written(found['mean'], goal):>22}{interval:>22}{written(found['iqm'], goal):>10}")
+    return lines
 
 
 def _saved_lines(rows: Mapping[str, Any]) -> list[str]:
@@ -170,14 +201,15 @@ def _interval(summary: Mapping[str, Any]) -> str:
     return "{:.1f} .. {:.1f}".format(*(100.0 * bound for bound in summary["ci95"]))
 
 
-def _difference_lines(policy: str, differences: Mapping[str, Any], metric: str) -> list[str]:
+def _difference_lines(policy: str, differences: Mapping[str, Any], metric: Metric) -> list[str]:
     """Return a line for each other policy: the paired difference of a metric."""
-    lines = []
+    lines, unit = [], FORMS[metric.unit].difference
     for name, difference in differences.items():
-        low, high = (100.0 * bound for bound in difference["ci95"])
+        low, high = (written(bound, metric, "+") for bound in difference["ci95"])
+        gap = written(difference[f"{metric.name}_difference"], metric, "+")
         lines.append(
-            f"{policy} - {name}: {100 * difference[f'{metric}_difference']:+.1f} points {metric}, "
-            f"{low:+.1f} .. {high:+.1f}; more on {100 * difference['probability_of_improvement']:.0f} % of fires"
+            f"{policy} - {name}: {' '.join(filter(None, (gap, unit, metric.name)))}, {low} .. {high}; "
+            f"{metric.better} on {100 * difference['probability_of_improvement']:.0f} % of fires"
         )
     return lines
 
@@ -185,16 +217,15 @@ def _difference_lines(policy: str, differences: Mapping[str, Any], metric: str) 
 def _metric_lines(metrics: Sequence[Metric], rows: Mapping[str, Any]) -> list[str]:
     """Return a table of metrics: a line of titles, then means and 95 % intervals, a line for each policy."""
     first, are_several = metrics[0], bool(metrics[0].table)
-    title = first.table or first.title or first.name
-    title += " %" if first.unit == "%" else ""
+    title = headed(first, first.table)
     title += f", {first.better} is better" if first.better else ""
-    width, factor, form = max(22, len(title) + 2), *((100.0, ".1f") if first.unit == "%" else (1.0, ".3f"))
+    width = max(22, len(title) + 2)
     columns = [metric.title or metric.name for metric in metrics] if are_several else []
     lines = [(f"{title:<{width}}" + "".join(f"{column:>24}" for column in columns)).rstrip()]
     for policy, summary in rows.items():
         found = [summary[metric.name] for metric in metrics]
-        numbers = [[factor * number for number in (each["mean"], *each["ci95"])] for each in found]
-        cells = (f"{mean:{form}} ({low:{form}} .. {high:{form}})" for mean, low, high in numbers)
+        numbers = [[written(number, first) for number in (each["mean"], *each["ci95"])] for each in found]
+        cells = (f"{mean} ({low} .. {high})" for mean, low, high in numbers)
         lines.append(f"{policy:<{width}}" + "".join(f"{cell:>24}" for cell in cells))
     return lines
 
@@ -218,10 +249,11 @@ def _behaviour_lines(content: Mapping[str, Any]) -> list[str]:
 
 def _left_out_lines(content: Mapping[str, Any]) -> list[str]:
     """Return a line for each agent: the team's metric without the agent, minus that with it."""
-    lines, key = [], f"{content['goal']}_difference"
+    lines, aim = [], goal_of(content)
     for agent, loss in content["left_out"].items():
-        low, high = (100.0 * bound for bound in loss["ci95"])
-        lines.append(f"without {agent:<14}{-100 * loss[key]:>+8.1f}{f'{-high:+.1f} .. {-low:+.1f}':>16}")
+        high, low = (written(-bound, aim, "+") for bound in loss["ci95"])
+        gap = written(-loss[f"{aim.name}_difference"], aim, "+")
+        lines.append(f"without {agent:<14}{gap:>8}{f'{low} .. {high}':>16}")
     return lines
 
 

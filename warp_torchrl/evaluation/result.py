@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from warp_torchrl.evaluation.goal import Goal
+from warp_torchrl.evaluation.goal import SAVED
 from warp_torchrl.evaluation.maps import maps_line
 from warp_torchrl.evaluation.play import Episodes
 from warp_torchrl.evaluation.report import evaluation_table, report
@@ -51,7 +51,7 @@ class Result:
     world_overrides: Sequence[str] = ()
     frames: int | None = None
     trained: str = ""
-    goal: Goal = "saved"
+    goal: Metric = SAVED
     maps: Mapping[str, Any] | None = None
     rows: Sequence[Metric] = ()
     folder: Path | None = None

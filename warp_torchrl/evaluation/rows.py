@@ -6,8 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from warp_torchrl.evaluation.goal import SAVED
 from warp_torchrl.evaluation.reading import read_evaluation
-from warp_torchrl.evaluation.report import worlds_name
+from warp_torchrl.evaluation.report import goal_of, worlds_name
+from warp_torchrl.world.mechanics.mechanic import Metric
 
 _Key = tuple[str, str, str, tuple[int, ...]]  # scenario, method, configuration, seeds
 
@@ -21,7 +23,7 @@ class SummaryRow(NamedTuple):
     success: np.ndarray  # [runs, n]
     seeds: tuple[int, ...]
     metrics: Mapping[str, np.ndarray] = {}  # by name, [runs, n], NaN where an episode has none; empty for baselines
-    goal: str = "saved"  # what policies are compared by there
+    goal: Metric = SAVED  # what policies are compared by there
     folders: tuple[Path, ...] = ()  # of the runs; none of baselines
 
 
@@ -48,7 +50,7 @@ def read_rows(*folders: Path) -> list[SummaryRow]:
             _of_episodes(runs, "success"),
             seeds,
             {name: _of_episodes(runs, name) for name in runs[0]["episodes"][0] if name != "seed"},
-            runs[0]["goal"],
+            goal_of(runs[0]),
             tuple(run["folder"] for run in runs),
         )
         for (scenario, method, configuration, seeds), runs in found.items()
@@ -60,14 +62,16 @@ def _baselines(found: Mapping[_Key, Sequence[Mapping[str, Any]]]) -> list[Summar
 
     A baseline whose episodes differ between evaluations played in different worlds, and is left out.
     """
-    held: dict[tuple[str, str, str, tuple[int, ...]], list[Mapping[str, Any]]] = {}
+    held: dict[tuple[str, str, Metric, tuple[int, ...]], list[Mapping[str, Any]]] = {}
     for (scenario, _, _, seeds), runs in found.items():
         for run in runs:
             for name, episodes in run["baseline_episodes"].items():
                 if (scenario, name, "", seeds) not in found:
-                    held.setdefault((scenario, name, run["goal"], seeds), []).append(episodes)
+                    held.setdefault((scenario, name, goal_of(run), seeds), []).append(episodes)
     return [
-        SummaryRow(scenario, name, np.array([episodes[0][goal]]), np.array([episodes[0]["success"]]), seeds, goal=goal)
+        SummaryRow(
+            scenario, name, np.array([episodes[0][goal.name]]), np.array([episodes[0]["success"]]), seeds, goal=goal
+        )
         for (scenario, name, goal, seeds), episodes in held.items()
         if all(each == episodes[0] for each in episodes)
     ]

@@ -50,21 +50,22 @@ def summarise(values: np.ndarray) -> dict[str, Any]:
     }
 
 
-def compare(values: np.ndarray, other: np.ndarray, metric: str = "saved") -> dict[str, Any]:
+def compare(values: np.ndarray, other: np.ndarray, metric: str = "saved", sign: float = 1.0) -> dict[str, Any]:
     """Return the difference in a metric between two policies, paired by world, with 95 % intervals.
 
     Args:
         values: The metric of the policy, [n] or [runs, n].
         other: The metric of the other policy in the same worlds, [n] or [runs, n].
         metric: Its name, by which the difference is called.
+        sign: -1 where less of it is better.
 
     Returns:
         ``saved_difference``, or that of the metric, and ``ci95``; ``probability_of_improvement``, the probability that
-        a run of the policy has more in a world than a run of the other (ties count half), and ``probability_ci95``.
+        a run of the policy does better in a world than a run of the other (ties count half), and ``probability_ci95``.
     """
     mine, theirs = np.atleast_2d(values), np.atleast_2d(other)
     difference = mine - theirs.mean(axis=0)
-    gap = mine[:, None] - theirs[None]
+    gap = sign * (mine[:, None] - theirs[None])
     better = ((gap > 0.0) + 0.5 * (gap == 0.0)).mean(axis=1)
     return {
         f"{metric}_difference": float(difference.mean()),

@@ -19,11 +19,13 @@ from warp_torchrl.evaluation.exports import draw_curves, marl_eval, rliable
 from warp_torchrl.evaluation.report import LEGEND, MEANING
 from warp_torchrl.evaluation.rows import SummaryRow, read_rows
 from warp_torchrl.evaluation.statistics import compare, performance_profile, summarise
+from warp_torchrl.evaluation.units import FORMS, headed, sign_of, written
 from warp_torchrl.system import disk
 from warp_torchrl.system.flags import FlagParser
 from warp_torchrl.system.foreign_text import plain_text
 from warp_torchrl.system.signals import exit_on_signal
 from warp_torchrl.validation import did_you_mean
+from warp_torchrl.world.mechanics.mechanic import Metric
 
 LEVELS = np.linspace(0.0, 1.0, 101)
 WORDS = (
@@ -50,14 +52,15 @@ def summary_table(entries: Sequence[SummaryRow], against: str | None = None) -> 
     known = list(dict.fromkeys(entry.policy for entry in entries))
     if against not in (None, *known):
         raise ValueError(f"against must be one of {', '.join(known)}, got {against}{did_you_mean(against, known)}")
-    goals = sorted({entry.goal for entry in entries})  # saved first
+    goals = sorted({entry.goal for entry in entries}, key=lambda goal: (goal.name != "saved", goal))
     return "\n\n".join(_table(goal, [entry for entry in entries if entry.goal == goal], against) for goal in goals)
 
 
-def _table(goal: str, entries: Sequence[SummaryRow], against: str | None) -> str:
+def _table(goal: Metric, entries: Sequence[SummaryRow], against: str | None) -> str:
     """Return the table of the scenarios of one goal."""
     lines = [
-        f"| scenario | policy | runs | fires | {goal} % | 95 % | iqm % | success % | to {against or 'the best'} | 95 % "
+        f"| scenario | policy | runs | fires | {headed(goal, goal.name)} | 95 % | {headed(goal, 'iqm')} | success % "
+        f"| to {against or 'the best'} | 95 % "
         "| better on |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
@@ -70,18 +73,18 @@ def _table(goal: str, entries: Sequence[SummaryRow], against: str | None) -> str
                 entry.policy,
                 str(len(entry.value)),
                 str(entry.value.shape[1]),
-                f"{100 * found['mean']:.1f}",
-                _range(found["ci95"]),
-                f"{100 * found['iqm']:.1f}",
+                written(found["mean"], goal),
+                _range(found["ci95"], goal),
+                written(found["iqm"], goal),
                 f"{100 * entry.success.mean():.1f}",
             ]
             if entry is other or entry.seeds != other.seeds:
                 cells += ["-", "-", "-"]
             else:
-                gap = compare(entry.value, other.value, goal)
+                gap = compare(entry.value, other.value, goal.name, sign_of(goal))
                 cells += [
-                    f"{100 * gap[f'{goal}_difference']:+.1f}",
-                    _range(gap["ci95"], "+"),
+                    written(gap[f"{goal.name}_difference"], goal, "+"),
+                    _range(gap["ci95"], goal, "+"),
                     f"{100 * gap['probability_of_improvement']:.0f} %",
                 ]
             lines.append("| " + " | ".join(map(_cell, cells)) + " |")
@@ -119,7 +122,7 @@ def _mean_of_known(values: np.ndarray | None) -> str:
 
 
 def draw_summary(entries: Sequence[SummaryRow], path: Path) -> None:
-    """Draw the trees saved, or the front watched, with their intervals, and the performance profile of each policy.
+    """Draw the goal of each scenario, the trees saved or another, with intervals, and the profile of each policy.
 
     Raises:
         ImportError: If Matplotlib is not installed.
@@ -138,14 +141,17 @@ def draw_summary(entries: Sequence[SummaryRow], path: Path) -> None:
         axes = figure.subplots(len(groups), 2, squeeze=False, height_ratios=rows)
         for (bars, profile), group in zip(axes, groups, strict=True):
             _draw_bars(bars, group, styles)
+            goal, (levels, end) = group[0].goal, _levels(group)
             for entry in group:
-                shares = 100.0 * performance_profile(entry.value, LEVELS)
-                profile.plot(100.0 * LEVELS, shares, label=entry.policy, linewidth=1.4, **styles[entry.policy])
-            profile.set(xlim=(0, 100), ylim=(0, 102), ylabel="fires, %")
-            goal = _WORDS[group[0].goal]
-            if group is groups[-1] or any(goal != _WORDS[each[0].goal] for each in groups):
-                bars.set_xlabel(f"{goal}: mean, 95 % interval, %")
-                profile.set_xlabel(f"{goal} on so many fires, at least, %")
+                shares = 100.0 * performance_profile(sign_of(goal) * entry.value, sign_of(goal) * levels)
+                shown = FORMS[goal.unit].factor * levels
+                profile.plot(shown, shares, label=entry.policy, linewidth=1.4, **styles[entry.policy])
+            profile.set(xlim=(0, end), ylim=(0, 102), ylabel="fires, %")
+            if group is groups[-1] or any(goal != each[0].goal for each in groups):
+                words, unit = _WORDS.get(goal.name, goal.name.replace("_", " ")), "" if goal.unit == "1" else goal.unit
+                bound = "at most" if goal.better == "less" else "at least"
+                bars.set_xlabel(", ".join(filter(None, (f"{words}: mean, 95 % interval", unit))))
+                profile.set_xlabel(", ".join(filter(None, (f"{words} on so many fires, {bound}", unit))))
         handles = {h.get_label(): h for row in axes for h in row[1].get_lines()}
         figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=columns, frameon=False)
         with disk.drafted(path) as draft:
@@ -154,7 +160,14 @@ def draw_summary(entries: Sequence[SummaryRow], path: Path) -> None:
 
 _WORDS = {"saved": "forest saved", "watched": "front watched"}
 _LABEL_WIDTH, _LEGEND_WIDTH = 32, 130  # characters in a line
-_ROOM_BESIDE = 87.0  # longer bars have their number inside
+_ROOM_BESIDE = 0.87  # of the axis; longer bars have their number inside
+
+
+def _levels(group: Sequence[SummaryRow]) -> tuple[np.ndarray, float]:
+    """Return the levels of a group's profile, and where its axes end, in the unit that is shown."""
+    goal = group[0].goal
+    top = 1.0 if goal.unit == "%" else float(max(entry.value.max() for entry in group)) or 1.0
+    return top * LEVELS, FORMS[goal.unit].factor * top
 
 
 def _bar_height(group: Sequence[SummaryRow]) -> float:
@@ -167,15 +180,16 @@ def _label(entry: SummaryRow) -> str:
 
 
 def _draw_bars(axes: Any, group: Sequence[SummaryRow], styles: Mapping[str, Mapping[str, Any]]) -> None:
+    (_, end), factor = _levels(group), FORMS[group[0].goal.unit].factor
     for row, entry in enumerate(reversed(group)):
         found = summarise(entry.value)
-        mean, (low, high) = 100 * found["mean"], (100 * bound for bound in found["ci95"])
+        mean, (low, high) = factor * found["mean"], (factor * bound for bound in found["ci95"])
         axes.barh(row, mean, height=0.7, color=styles[entry.policy]["color"], alpha=0.75)
         axes.errorbar(mean, row, xerr=[[mean - low], [high - mean]], color="#222222", capsize=2.5, linewidth=1.0)
-        place, side = (high + 1.5, "left") if high < _ROOM_BESIDE else (low - 1.5, "right")
-        axes.text(place, row, f"{mean:.1f}", va="center", ha=side, fontsize=7.0)
+        place, side = (high + 0.015 * end, "left") if high < _ROOM_BESIDE * end else (low - 0.015 * end, "right")
+        axes.text(place, row, written(found["mean"], entry.goal), va="center", ha=side, fontsize=7.0)
     labels = [_label(entry) for entry in reversed(group)]
-    axes.set(yticks=range(len(group)), yticklabels=labels, xlim=(0, 100))
+    axes.set(yticks=range(len(group)), yticklabels=labels, xlim=(0, end))
     axes.set_title(group[0].scenario, fontsize=8.0, loc="left")
 
 
@@ -183,12 +197,11 @@ def _by_scenario(entries: Sequence[SummaryRow]) -> list[list[SummaryRow]]:
     """Return the entries of each scenario, the best first."""
     scenarios = dict.fromkeys(entry.scenario for entry in entries)
     groups = [[entry for entry in entries if entry.scenario == scenario] for scenario in scenarios]
-    return [sorted(group, key=lambda entry: -entry.value.mean()) for group in groups]
+    return [sorted(group, key=lambda entry: -sign_of(entry.goal) * entry.value.mean()) for group in groups]
 
 
-def _range(bounds: Sequence[float], sign: str = "") -> str:
-    low, high = (100.0 * bound for bound in bounds)
-    return f"{low:{sign}.1f} .. {high:{sign}.1f}"
+def _range(bounds: Sequence[float], goal: Metric, sign: str = "") -> str:
+    return " .. ".join(written(bound, goal, sign) for bound in bounds)
 
 
 @exit_on_signal()

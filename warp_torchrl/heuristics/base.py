@@ -12,6 +12,7 @@ from warp_torchrl.world.arrays.random import Stream, uniform, uniform_at
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.records import known_codes, records_of
 from warp_torchrl.world.state.state import FIRST_FIRE, Action, Cover, WorldState
+from warp_torchrl.world.team.presence import on_scene
 from warp_torchrl.world.team.supply import mark_base
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.world import World
@@ -170,6 +171,8 @@ def match_cells(state: WorldState, cells: Tensor, gain: Tensor, spacing: int, di
         taken: See ``claim_cells``.
     """
     worlds, agents, count = gain.shape
+    there = on_scene(state)
+    gain = gain if there is None else gain.masked_fill_(~there[..., None], -math.inf)
     claim = state.vehicles.position.clone()
     rows, columns = _rows_and_columns(cells, state)
     world = torch.arange(worlds, device=cells.device)

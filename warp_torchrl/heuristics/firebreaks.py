@@ -6,6 +6,7 @@ from torch import Tensor
 from warp_torchrl.world.arrays.distances import distance_to_nearest
 from warp_torchrl.world.fires.reach import distance_from_fire
 from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.team.presence import those_there
 from warp_torchrl.world.world import World
 
 _THREATENED = 0.01
@@ -27,7 +28,7 @@ def cells_to_clear(state: WorldState, world: World, clears: Tensor, effort: floa
     Args:
         state: The worlds.
         world: Their rules; S is its steps per tick.
-        clears: Agents that clear, bool [A], at least one.
+        clears: Agents that clear, bool [A], at least one; absent ones do not.
         effort: Steps that one agent takes for a cell of the ring.
     """
     away = distance_from_fire(state, world).to(torch.int64)
@@ -35,9 +36,11 @@ def cells_to_clear(state: WorldState, world: World, clears: Tensor, effort: floa
     count = torch.zeros(len(away), len(distance) + 2, device=away.device)
     count.scatter_add_(1, away.flatten(1), (away > 0).flatten(1).to(count.dtype))
     burning = world.fire.spreads(state)
-    farthest = distance_to_nearest(state.vehicles.position[:, clears], burning).amax(dim=1)
+    ways = distance_to_nearest(state.vehicles.position[:, clears], burning)
+    works = those_there(state, clears.expand(len(away), -1))[:, clears]
+    farthest = ways.masked_fill(~works, 0).amax(dim=1)
     way = (farthest[:, None] - distance).clamp(min=0)
-    needed = way + effort * count[:, 1:-1] / clears.sum()
+    needed = way + effort * count[:, 1:-1] / works.sum(dim=1, keepdim=True).clamp(min=1)
     steps = world.steps_per_tick
     left = ((distance - 1) / pace_of_fire(state, world)[:, None] + 1.0) * steps - (state.step % steps)[:, None]
     first = (needed <= left).to(torch.uint8).argmax(dim=1)

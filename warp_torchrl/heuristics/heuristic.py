@@ -12,6 +12,7 @@ from warp_torchrl.heuristics.seeking import by_own_view, can_act_on_fire, seek
 from warp_torchrl.system.modes import apart
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.team.presence import staying
 from warp_torchrl.world.world import World
 
 
@@ -63,7 +64,7 @@ class Heuristic(TensorDictModuleBase):
         state, world = self.env.shared_state, self.world
         shown = tensordict.get(("agents", "action_mask"))
         action = self.act(state, shown if world.action_masking else world.possible_actions(state))
-        return tensordict.set(("agents", "action"), action)
+        return tensordict.set(("agents", "action"), staying(state, action))
 
     def act(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A], as far as agents know the worlds.

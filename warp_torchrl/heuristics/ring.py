@@ -18,6 +18,7 @@ from warp_torchrl.world.arrays.geometry import grow
 from warp_torchrl.world.arrays.listing import list_cells
 from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.state import Action, WorldState
+from warp_torchrl.world.team.presence import those_there
 
 
 class Ring(Coordinated):
@@ -43,7 +44,7 @@ class Ring(Coordinated):
         """Return the actions, int64 [B, A]."""
         self._update_plan(state)
         todo = self._plan & is_tree(state.cells) & (state.alpha > 0.0)
-        builds = self.line_builders(state) & todo.flatten(1).any(dim=1)[:, None]
+        builds = those_there(state, self.line_builders(state)) & todo.flatten(1).any(dim=1)[:, None]
         value, front = self.value(state)
         cells, valid = list_cells(todo | front)
         worth = value.flatten(1).gather(1, cells).masked_fill_(~(front.flatten(1).gather(1, cells) & valid), -math.inf)
@@ -78,9 +79,11 @@ class Ring(Coordinated):
         cells = torch.zeros(len(burning), reach + 1, device=burning.device)
         cells.scatter_add_(1, away.flatten(1), fuel.flatten(1).to(cells.dtype))
         distance = torch.arange(1, reach, device=burning.device)
-        farthest = distance_to_nearest(state.vehicles.position, burning).amax(dim=1)
+        ways = distance_to_nearest(state.vehicles.position, burning)
+        there = those_there(state, torch.ones_like(ways, dtype=torch.bool))
+        farthest = ways.masked_fill(~there, 0).amax(dim=1)
         way = farthest[:, None] - distance
-        workers = self.line_builders(state).sum().clamp(min=1)
+        workers = those_there(state, self.line_builders(state)).sum(dim=-1, keepdim=True).clamp(min=1)
         need = way.clamp(min=0) + self.effort * cells[:, 1:reach] / workers
         steps = world.steps_per_tick * world.fire.ticks_per_stage / self.pace
         fits = need <= (distance - 1) * steps

@@ -16,6 +16,7 @@ from warp_torchrl.live.ground import SceneGround
 from warp_torchrl.world.arrays.geometry import unit_vectors
 from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
+from warp_torchrl.world.team.presence import those_there
 
 VEHICLE_COLOURS = np.array(  # Okabe and Ito 2008, on the dark sides of a vehicle; then again from the first
     [(255, 255, 255), (230, 159, 0), (86, 180, 233), (240, 228, 66), (204, 121, 167), (0, 158, 115), (213, 94, 0),
@@ -147,7 +148,7 @@ def glow(state: WorldState, ground: SceneGround) -> tuple[tuple[float, float, fl
 
 
 def vehicles(state: WorldState, ground: SceneGround, flies: Tensor, facing: Tensor) -> Instances:
-    """Return the vehicles of world 0.
+    """Return the vehicles of world 0; absent ones have no size.
 
     Args:
         state: The worlds.
@@ -158,13 +159,14 @@ def vehicles(state: WorldState, ground: SceneGround, flies: Tensor, facing: Tens
     place = state.vehicles.position[0]
     index = (place[:, 0] * ground.size[1] + place[:, 1]).numpy()
     position = ground.position[index] + np.array([0.0, 0.0, 1.0]) * (flies.numpy()[:, None] * _FLIGHT + 0.05)
-    size = max(1.25, max(ground.size) / 42.0)
+    size = np.full((len(index), 3), max(1.25, max(ground.size) / 42.0), dtype=np.float32)
+    size *= those_there(state, torch.ones_like(place[None, :, 0], dtype=torch.bool))[0, :, None].numpy()
     half = _angles(facing) / 2.0
     zero = torch.zeros_like(half)
     return Instances(
         position=position.astype(np.float32),
         turn=torch.stack((half.cos(), zero, zero, half.sin()), dim=1).numpy(),
-        scale=np.full((len(index), 3), size, dtype=np.float32),
+        scale=size,
         colour=VEHICLE_COLOURS[np.arange(len(index)) % len(VEHICLE_COLOURS)],
     )
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from warp_torchrl.algorithms import parallel
 from warp_torchrl.algorithms.parallel import WorkerDied
-from warp_torchrl.evaluation.goal import goal
+from warp_torchrl.evaluation.goal import better_of, goal
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.models import signature
 from warp_torchrl.runs import checkpoint as checkpoints
@@ -180,11 +180,12 @@ class Training(Learning):
             return chosen
         first, kinds = self.run_config.first_seed, self.run_config.kinds
         reached: dict[str, list[float]] = {mode: [] for mode in MODES}
-        for kind in kinds:
+        aims = [goal(kind.world) for kind in kinds]
+        for kind, aim in zip(kinds, aims, strict=True):
             env = self.run_config.make_env(min(self.run_config.evaluation.episodes, WORLDS), first, world=kind.world)
             for mode, values in reached.items():
-                values.append(float(play(env, self.learner.policy, first, mode)[goal(env.world)].mean()))
-        better = max(reached, key=lambda mode: sum(reached[mode]))
+                values.append(float(play(env, self.learner.policy, first, mode)[aim.name].mean()))
+        better = better_of(reached, aims)
         if len(kinds) > 1:
             told = ", ".join(f"{kind.name} {value:.3f}" for kind, value in zip(kinds, reached[better], strict=True))
             log.info("on training fires, %s, the team saves of each kind: %s", better, told)

@@ -35,11 +35,13 @@ from warp_torchrl.env.observation.features import (
 )
 from warp_torchrl.env.observation.status import WIND_SCALE, steps_to_tick, time_left
 from warp_torchrl.world.arrays.blocks import block_means
+from warp_torchrl.world.arrays.distances import FAR
 from warp_torchrl.world.fires.reach import distance_from_fire
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.records import freshness, kept, known_codes
 from warp_torchrl.world.state.state import FIRST_FIRE, Forecast, WorldState
 from warp_torchrl.world.team.places import block_of
+from warp_torchrl.world.team.presence import on_scene, those_there
 from warp_torchrl.world.world import World
 
 STATE_SIDE = 16
@@ -155,12 +157,13 @@ def _of_roles(world: World, names: Sequence[str]) -> tuple[Content, ...]:
 
 @state_plane(lambda world: [Part("agents", world.team.role_names)], _of_roles, everywhere)
 def vehicles(now: Context) -> Tensor:
-    """Return how many vehicles of each role there are."""
+    """Return how many vehicles of each role there are on the scene."""
     cells, team = now.state.cells, now.world.team
     worlds, roles = cells.shape[0], len(team.role_names)
     index = team.table(cells.device).index * STATE_SIDE**2 + block_of(now.state, STATE_SIDE)
     count = torch.zeros(worlds, roles * STATE_SIDE**2, device=cells.device)
-    count = count.scatter_add(1, index, torch.ones_like(index, dtype=torch.float32))
+    each = those_there(now.state, torch.ones_like(index, dtype=torch.bool))
+    count = count.scatter_add(1, index, each.to(torch.float32))
     return count.view(worlds, roles, STATE_SIDE, STATE_SIDE)
 
 
@@ -253,5 +256,7 @@ def reach_of_fire_and_team(state: WorldState, world: World) -> tuple[Tensor, Ten
     row, column = (state.vehicles.position + 0.5).unbind(-1)
     down = (middle * (height / STATE_SIDE) - row[..., None]).abs()
     across = (middle * (width / STATE_SIDE) - column[..., None]).abs()
-    nearest = torch.maximum(down[..., :, None], across[..., None, :]).amin(dim=1)
+    ways = torch.maximum(down[..., :, None], across[..., None, :])
+    there = on_scene(state)
+    nearest = (ways if there is None else ways.masked_fill(~there[..., None, None], float(FAR))).amin(dim=1)
     return fire, torch.exp(nearest / (-2.0 * side))

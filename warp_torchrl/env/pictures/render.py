@@ -17,6 +17,7 @@ from warp_torchrl.world.state.cells import count_trees, is_burning
 from warp_torchrl.world.state.records import freshness, records_of
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import EMPTY, FIRST_FIRE, OLDEST, Cover, WorldState
+from warp_torchrl.world.team.presence import on_scene
 
 # The fire front, 11..13, is lighter than any ground; 14 stays 16 units of CIE Lab off without the red or green cone.
 _GROUND = {  # without a tree, youngest tree, oldest tree
@@ -64,7 +65,7 @@ def painted(colours: Tensor, state: WorldState, flies: Tensor | None, scale: int
         image = _with_borders(image, owner.repeat_interleave(scale, dim=1).repeat_interleave(scale, dim=2))
     if flies is None:
         return image
-    return _stamp(image, state.vehicles.position * scale + scale // 2, flies.to(torch.int64), scale)
+    return _stamp(image, state.vehicles.position * scale + scale // 2, flies.to(torch.int64), scale, on_scene(state))
 
 
 def fire_colours() -> Tensor:
@@ -187,7 +188,7 @@ def _glyphs(radius: int, device: torch.device) -> Tensor:
     return (room >= 0).to(torch.int64) + (room > radius // 8)
 
 
-def _stamp(image: Tensor, centre: Tensor, roles: Tensor, scale: int = 1) -> Tensor:
+def _stamp(image: Tensor, centre: Tensor, roles: Tensor, scale: int = 1, there: Tensor | None = None) -> Tensor:
     """Draw the agents over images, aircraft on top: a little larger than a cell, and never too small to see.
 
     Images are uint8 [B, h, w, 3], centres (row, column) int64 [B, A, 2] [pixels], roles int64 [A].
@@ -198,6 +199,7 @@ def _stamp(image: Tensor, centre: Tensor, roles: Tensor, scale: int = 1) -> Tens
     part = _glyphs(radius, device)[roles]
     rank = (roles * agents + torch.arange(agents, device=device))[:, None, None]
     layer = (rank * 3 + part) * (part > 0)  # the largest wins, in whatever order the agents are drawn
+    layer = layer[None] if there is None else layer * there[..., None, None]
     offset = torch.arange(2 * radius + 1, device=device)  # from the corner of a canvas with a margin of a radius
     row, column = centre[..., 0, None, None] + offset[:, None], centre[..., 1, None, None] + offset
     index = (row * (width + 2 * radius) + column).flatten(1)
@@ -216,7 +218,8 @@ def _fitted_map(state: WorldState, flies: Tensor) -> np.ndarray:
         return render(state, flies, max(1, round(1 / shrink)))[0].cpu().numpy()
     colours = ground_colours(state).movedim(3, 1).float()
     image = interpolate(colours, (math.ceil(height / shrink), math.ceil(width / shrink)), mode="area").round()
-    return _stamp(image.byte().movedim(1, 3), (state.vehicles.position / shrink).long(), flies.long())[0].cpu().numpy()
+    place = (state.vehicles.position / shrink).long()
+    return _stamp(image.byte().movedim(1, 3), place, flies.long(), 1, on_scene(state))[0].cpu().numpy()
 
 
 @lru_cache(maxsize=1)

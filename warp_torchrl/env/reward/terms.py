@@ -15,6 +15,7 @@ from warp_torchrl.world.arrays.geometry import grow
 from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.front import alignment, centre, sector
 from warp_torchrl.world.state.state import Transition, TreeCounts, WorldState
+from warp_torchrl.world.team.presence import those_there
 
 Term = Callable[[Transition], Tensor]
 """What a step earns, float32 [B]: the difference of a state's value, or an event that can happen to a tree once."""
@@ -68,11 +69,12 @@ def _front(state: WorldState, counts: TreeCounts) -> Tensor:
 def _surrounded(state: WorldState) -> Tensor:
     fire = is_burning(state.cells)
     own = sector(state.vehicles.position, centre(fire), _SECTORS)
-    held = torch.zeros(len(own), _SECTORS, device=own.device).scatter_(1, own, 1.0)
+    there = those_there(state, torch.ones_like(own, dtype=torch.bool)).to(torch.float32)
+    held = torch.zeros(len(own), _SECTORS, device=own.device).scatter_reduce(1, own, there, "amax")
     return held.mean(dim=1).masked_fill(~fire.flatten(1).any(dim=1), 1.0)
 
 
 def _at_head(state: WorldState) -> Tensor:
     fire = is_burning(state.cells)
-    downwind = alignment(state.vehicles.position, centre(fire), state.wind) >= 0.0
+    downwind = those_there(state, alignment(state.vehicles.position, centre(fire), state.wind) >= 0.0)
     return downwind.to(torch.float32).mean(dim=1).masked_fill(~fire.flatten(1).any(dim=1), 1.0)

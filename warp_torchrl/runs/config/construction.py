@@ -11,6 +11,7 @@ from dataclasses import MISSING, fields, is_dataclass
 from inspect import isabstract
 from typing import Any, get_origin, get_type_hints
 
+from warp_torchrl.env.metrics import chosen_goal
 from warp_torchrl.validation import did_you_mean, fit
 from warp_torchrl.world.mechanics.mechanic import Mechanic
 from warp_torchrl.world.mechanics.table import mechanics
@@ -22,7 +23,7 @@ ENVIRONMENT = (*OF_WORLDS, "observation", "reward")
 """Those that make an environment."""
 COMPONENTS = (*ENVIRONMENT, "model", "algorithm", "collector", "curriculum", "mixture", "logger")
 """All groups whose options are classes."""
-WORLD_KEYS = ("scenario", *OF_WORLDS, "mechanics", "steps_per_tick", "horizon", "cell_size", "action_masking")
+WORLD_KEYS = ("scenario", *OF_WORLDS, "mechanics", "steps_per_tick", "horizon", "cell_size", "action_masking", "goal")
 """What a scenario sets."""
 COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite", "maps", "maps_fires", "picture")
 """What the commands read themselves."""
@@ -153,11 +154,12 @@ def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENT
     built = {name: build(config[name], name) for name in dict.fromkeys((*first, *names))}
     built["mechanics"] = build_mechanics(config.get("mechanics", {}))
     world = construct(World, chosen(World, {**config, **built}), "")
-    if "reward" in built:
-        try:
+    try:
+        chosen_goal(world)
+        if "reward" in built:
             built["reward"].check_world(world)
-        except ValueError as error:
-            raise ConfigError(str(error)) from None
+    except ValueError as error:
+        raise ConfigError(str(error)) from None
     return {**built, "world": world}
 
 

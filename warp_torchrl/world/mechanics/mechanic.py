@@ -66,20 +66,24 @@ class Rules(Protocol):
         ...
 
 
+Unit = Literal["%", "1", "min", "ha", "USD"]
+"""In which tables show a metric: shares in ``%``, or numbers as they are: ``1``, minutes, hectares, dollars."""
+
+
 class Metric(NamedTuple):
-    """A row of the metrics of episodes: a number of each world in 0..1.
+    """A row of the metrics of episodes: a number of each world, a share in 0..1 where its unit is ``%``.
 
     Attributes:
         name: Of its entry in ``info``, ``metrics.csv`` and ``evaluation.json``.
         better: Whether more or less of it is better; empty, neither.
-        unit: In which tables show it: ``%``, or ``1`` for the number.
+        unit: In which tables show it.
         title: What tables call it; empty, its name.
         table: Title of a table that it shares with other metrics, of one unit; empty, it has a table to itself.
     """
 
     name: str
     better: Literal["more", "less", ""] = ""
-    unit: Literal["%", "1"] = "%"
+    unit: Unit = "%"
     title: str = ""
     table: str = ""
 
@@ -217,7 +221,7 @@ class Mechanic:
         return ()
 
     def metrics(self, state: WorldState) -> dict[str, Tensor]:
-        """Return the metrics of each world's episode so far, numbers in 0..1, float32 [B] each by name."""
+        """Return the metrics of each world's episode so far, in their units, float32 [B] each by name."""
         return {}
 
     def entries(self, world: Rules) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.team.presence import pairs_there
 
 HEARING = "radio"
 """Name of what is under way, among the planes of the state."""
@@ -47,7 +48,7 @@ class Hearing:
             flies: Which agents fly, bool [A].
         """
         others = ~torch.eye(state.vehicles.position.shape[1], dtype=torch.bool, device=state.cells.device)
-        return others.expand(len(state.cells), -1, -1)
+        return pairs_there(state, others.expand(len(state.cells), -1, -1))
 
     def places(self, state: WorldState) -> Tensor:
         """Return where agents were when they sent what arrives now, int64 [B, A, 2], in cells."""

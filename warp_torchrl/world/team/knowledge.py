@@ -9,6 +9,7 @@ from torch import Tensor
 from warp_torchrl.system.modes import kept
 from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.team.hearing import Hearing
+from warp_torchrl.world.team.presence import pairs_there
 from warp_torchrl.world.team.team import Team
 
 _EVERYWHERE = 1 << 20
@@ -71,8 +72,9 @@ class Full(Sensing):
         return [_EVERYWHERE] * team.n_agents
 
     def knows_where(self, state: WorldState, team: Team, hearing: Hearing) -> tuple[Tensor, Tensor]:
-        """Return that each knows where all others are, bool [1, A, A], and where they are, int64 [B, 1, A, 2]."""
-        return _others(team.n_agents, state.cells.device), state.vehicles.position[:, None]
+        """Return that each knows where all others are, bool [B or 1, A, A], and where they are, int64 [B, 1, A, 2]."""
+        others = _others(team.n_agents, state.cells.device)
+        return pairs_there(state, others), state.vehicles.position[:, None]
 
 
 @kept(32)

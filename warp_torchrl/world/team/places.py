@@ -8,6 +8,7 @@ from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.state import Action, WorldState
 from warp_torchrl.world.team.abilities import own_cell
+from warp_torchrl.world.team.presence import pairs_there
 
 _APPROACH = (0, 2, 4, 6, 7, 1, 3, 5)
 """Directions in the order in which an aircraft on its way to the fire prefers them: N, E, S, W, NW, NE, SE, SW."""
@@ -73,11 +74,12 @@ def approach_move(state: WorldState) -> Tensor:
 def nearest_mate(state: WorldState) -> Tensor:
     """Return the index of the team-mate nearest to each agent, the first of those as near, int64 [B, A].
 
-    Of an agent alone it is its own.
+    Of an agent that is alone on the scene it is its own.
     """
     position = state.vehicles.position
     square = (position[:, :, None] - position[:, None]).square().sum(-1)
     alone = torch.eye(position.shape[1], dtype=torch.bool, device=position.device)
+    square = square.masked_fill(~pairs_there(state, ~alone[None]), (1 << 40) + 1)
     return square.masked_fill(alone, 1 << 40).argmin(dim=-1)
 
 

@@ -14,6 +14,7 @@ from warp_torchrl.world.state.role import ROLES, RoleTable, role_names, role_tab
 from warp_torchrl.world.state.state import Action, ActionResult, Vehicles, WorldState
 from warp_torchrl.world.team.abilities import ABILITIES, PAPER_ABILITIES, AgentContext
 from warp_torchrl.world.team.acting import Acts, TeamAbility, TeamRule, changed, grounded_by, is_second
+from warp_torchrl.world.team.presence import staying
 from warp_torchrl.world.team.start import starting_cells
 from warp_torchrl.world.team.supply import filled
 
@@ -176,7 +177,12 @@ class Team:
             The worlds after it, and what each action came to.
         """
         acts: Acts = partial(
-            self._act, action=action, running=running, last_spreading=last_spreading, wet_ticks=wet_ticks, rules=rules
+            self._act,
+            action=staying(state, action),
+            running=running,
+            last_spreading=last_spreading,
+            wet_ticks=wet_ticks,
+            rules=rules,
         )
         for rule in rules:
             acts = partial(rule.around, running=running, acts=acts)

@@ -15,6 +15,7 @@ from warp_torchrl.world.mechanics.table import mechanic
 from warp_torchrl.world.state.role import RoleTable
 from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.team.places import wind_at
+from warp_torchrl.world.team.presence import those_there
 
 AT_BASE = 1
 """Chebyshev distance from the base within which batteries are charged: strides of two cells may pass the base by."""
@@ -68,14 +69,14 @@ class Flight(Mechanic):
 
     def moved(self, state: WorldState, roles: RoleTable, running: Tensor) -> WorldState:
         """Return worlds in which the wind has carried aircraft, and what follows from where they are is counted."""
-        running = running[:, None]
-        state = self._drifted(state, roles, running)
+        running, flies = running[:, None], those_there(state, roles.flies)
+        state = self._drifted(state, roles, running & flies)
         aircraft = state.planes(self.name, Aircraft)
         return state.with_planes(
             self.name,
             Aircraft(
-                near_misses=self._near_misses(state, aircraft.near_misses, roles.flies, running),
-                battery=self._batteries(state, aircraft.battery, roles.flies, running),
+                near_misses=self._near_misses(state, aircraft.near_misses, flies, running),
+                battery=self._batteries(state, aircraft.battery, flies, running),
             ),
         )
 
@@ -120,15 +121,15 @@ class Flight(Mechanic):
         Args:
             state: The worlds after the moves.
             misses: Those before the step.
-            flies: Which agents fly, bool [A].
+            flies: Which agents fly, bool [A] or [B, A].
             running: Which worlds go on, bool [B, 1].
         """
         if self.separation is None or misses is None:
             return misses
         position = state.vehicles.position.to(torch.float32)
         apart = (position[:, :, None] - position[:, None]).square().sum(-1)
-        others = ~torch.eye(len(flies), dtype=torch.bool, device=flies.device)
-        near = ((apart < self.separation**2) & flies[:, None] & flies & others).any(dim=-1)
+        others = ~torch.eye(flies.shape[-1], dtype=torch.bool, device=flies.device)
+        near = ((apart < self.separation**2) & flies[..., None] & flies[..., None, :] & others).any(dim=-1)
         return misses + (near & running).to(torch.int32)
 
     def _batteries(self, state: WorldState, battery: Tensor | None, flies: Tensor, running: Tensor) -> Tensor | None:
@@ -139,7 +140,7 @@ class Flight(Mechanic):
         Args:
             state: The worlds after the moves.
             battery: Those before the step.
-            flies: Which agents fly, bool [A]; the others keep theirs.
+            flies: Which agents fly, bool [A] or [B, A]; the others keep theirs.
             running: Which worlds go on, bool [B, 1].
         """
         if self.battery is None or battery is None:
@@ -149,7 +150,7 @@ class Flight(Mechanic):
         left = torch.where(at_base, self.battery, (battery - 1).clamp(min=0))
         return torch.where(running & flies, left, battery)
 
-    def _drifted(self, state: WorldState, roles: RoleTable, running: Tensor) -> WorldState:
+    def _drifted(self, state: WorldState, roles: RoleTable, flies: Tensor) -> WorldState:
         """Return the worlds after the wind has carried each aircraft one cell, or not at all.
 
         It does with chance min(1, drift x speed), towards that of the eight neighbours which is nearest to downwind,
@@ -158,7 +159,7 @@ class Flight(Mechanic):
         Args:
             state: The worlds after the moves.
             roles: Of the agents; aircraft with an empty battery are on the ground.
-            running: Which worlds go on, bool [B, 1].
+            flies: Which agents fly in worlds that go on, bool [B, A].
         """
         if self.drift == 0.0:
             return state
@@ -171,6 +172,6 @@ class Flight(Mechanic):
         on_map = (row >= 0) & (row < height) & (column >= 0) & (column < width)
         gust = uniform(state.key, state.step, Stream.DRIFT, (position.shape[1],)) < chance
         grounded = self.grounded(state, roles)
-        flying = running & roles.flies if grounded is None else running & roles.flies & ~grounded
+        flying = flies if grounded is None else flies & ~grounded
         position = position + step * (gust & on_map & flying)[..., None]
         return state.replace(vehicles=state.vehicles.replace(position=position))

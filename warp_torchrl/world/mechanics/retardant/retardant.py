@@ -19,6 +19,7 @@ from warp_torchrl.world.state.state import ActionResult, WorldState
 from warp_torchrl.world.team.abilities import own_cell
 from warp_torchrl.world.team.acting import Acts, changed, is_second
 from warp_torchrl.world.team.places import approach_move, has_reached
+from warp_torchrl.world.team.presence import those_there
 from warp_torchrl.world.team.team import Team
 
 TANKER = "tanker"
@@ -91,7 +92,7 @@ class RetardantTeam(Team, Mechanic):
         An aircraft that treats a tree is credited for it, unless it was treated in this tick already: then that was
         redundant.
         """
-        drops, step = self._drops(running.device) & running[:, None], state.step
+        drops, step = those_there(state, self._drops(running.device) & running[:, None]), state.step
         target, reached = own_cell(state), has_reached(state) & running[:, None]
         treated = first = torch.zeros_like(drops)
         if self.treats == "path":

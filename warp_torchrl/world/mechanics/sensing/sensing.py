@@ -25,6 +25,7 @@ from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
 from warp_torchrl.world.team.hearing import Hearing
 from warp_torchrl.world.team.knowledge import Sensing
 from warp_torchrl.world.team.places import in_reach
+from warp_torchrl.world.team.presence import on_scene, pairs_there
 from warp_torchrl.world.team.team import Team
 
 _EXPLAINED = 0.05
@@ -99,7 +100,7 @@ class Sight(Sensing, Mechanic):
         """
         sees, hears = others_in_sight(state, self.reach(team)), hearing.arriving(state, _flies(state, team))
         here, then = state.vehicles.position[:, None], hearing.places(state)[:, None]
-        return hears | sees, torch.where(sees[..., None], here, then)
+        return hears | pairs_there(state, sees), torch.where(sees[..., None], here, then)
 
     def signs(self, state: WorldState, team: Team, known: Tensor) -> Tensor | None:
         """Return where smoke may come from that no known fire explains, float32 [B, G, H, W]; None without smoke.
@@ -109,7 +110,7 @@ class Sight(Sensing, Mechanic):
         if self.smoke == 0.0:
             return None
         groups, wind = known.shape[1], state.wind.repeat_interleave(known.shape[1], dim=0)
-        reach, unseen = in_reach(state, self.reach(team)), steps_since(kept(state), state.step) > 0
+        reach, unseen = self._in_reach(state, team), steps_since(kept(state), state.step) > 0
         if groups == 1:
             reach, unseen = reach.any(dim=1, keepdim=True), unseen.all(dim=1, keepdim=True)
         unexplained = drifted(known.flatten(0, 1), wind, self.smoke_length) < _EXPLAINED
@@ -190,12 +191,17 @@ class Sight(Sensing, Mechanic):
 
     def _sees(self, state: WorldState, team: Team) -> Tensor:
         """Return which cells each agent sees, bool [B, A, H, W]."""
-        sees = in_reach(state, self.reach(team))
+        sees = self._in_reach(state, team)
         if self.smoke == 0.0:
             return sees
         clear = torch.exp(-self.smoke * smoke(state, self.smoke_length))
         draws = uniform(state.key, state.step, Stream.SMOKE, tuple(sees.shape[1:]))
         return sees & (draws < clear[:, None])
+
+    def _in_reach(self, state: WorldState, team: Team) -> Tensor:
+        """Return which cells are within reach of each agent on the scene, bool [B, A, H, W]."""
+        reach, there = in_reach(state, self.reach(team)), on_scene(state)
+        return reach if there is None else reach & there[..., None, None]
 
     def _taken_for(self, state: WorldState) -> Tensor:
         """Return what each agent takes each cell for if it sees it, uint8 [B, 1 or A, H, W]."""

@@ -1,0 +1,1 @@
+"""Arrivals: vehicles that join and leave."""

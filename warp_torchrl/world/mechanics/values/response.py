@@ -1,0 +1,40 @@
+"""Losses of assets by flame length, and rates of vehicles: the tables of ``values``."""
+
+import torch
+from torch import Tensor
+from torch.nn.functional import max_pool2d
+
+from warp_torchrl.world.arrays.constants import numbers
+
+LEVELS = (0.6096, 1.2192, 1.8288, 2.4384, 3.6576)
+"""Flame lengths that part the six fire intensity levels, 2, 4, 6, 8 and 12 ft [m] (Scott, Thompson and Calkin 2013)."""
+HOMES = (0.25, 0.40, 0.55, 0.70, 0.85, 1.0)
+"""Share of a home's worth that is lost at each level (Scott and others 2020, Wildfire Risk to Communities)."""
+RATES = {"ugv": 250.0, "uav": 2000.0, "scout": 500.0, "tanker": 7000.0}
+"""US dollars an hour by role: a bulldozer of type 2 with its operator and transport, a helicopter of type 3, a light
+aircraft that leads others, a large airtanker. They are round numbers of the size of the rates that agencies publish
+each year (California, hired equipment, handbook 3934; USDA Forest Service, aviation annual reports)."""
+
+
+def lost(flames: Tensor, losses: tuple[float, ...]) -> Tensor:
+    """Return the share of an asset's worth that is lost to flames of some length; 0 without any.
+
+    A response function by fire intensity level: the net value change of Scott, Thompson and Calkin (2013), "A wildfire
+    risk assessment framework for land and resource management", USDA Forest Service RMRS-GTR-315.
+
+    Args:
+        flames: Flame lengths, float32 [m].
+        losses: Of the six levels, 0..1.
+    """
+    level = torch.bucketize(flames, numbers(LEVELS, flames.device), right=True)
+    return numbers(losses, flames.device)[level] * (flames > 0.0)
+
+
+def longest_about(flames: Tensor, cells: int) -> Tensor:
+    """Return the longest flames within a Chebyshev distance of each cell, float32 [B, H, W].
+
+    Args:
+        flames: Flame lengths, float32 [B, H, W] [m].
+        cells: The distance.
+    """
+    return flames if cells == 0 else max_pool2d(flames[:, None], 2 * cells + 1, stride=1, padding=cells)[:, 0]
