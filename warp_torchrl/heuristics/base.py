@@ -28,8 +28,22 @@ def idle_action(mask: Tensor, team: Team) -> Tensor:
 
 
 def can_be_put_out(state: WorldState, world: World) -> Tensor:
-    """Return the burning cells that an agent can extinguish, bool [B, H, W]."""
-    return is_burning(state.cells) & (state.cells <= world.fire.last_spreading)
+    """Return the burning cells that an agent can extinguish, bool [B, H, W].
+
+    Those at which mechanics let nobody work (``Mechanic.workable``) are left out in worlds that have others.
+    """
+    fire = is_burning(state.cells) & (state.cells <= world.fire.last_spreading)
+    for each in world.loop:
+        able = each.workable(state, world)
+        if able is not None:
+            fire = torch.where((fire & able).flatten(1).any(dim=1)[:, None, None], fire & able, fire)
+    return fire
+
+
+def steps_to_clear(state: WorldState, world: World) -> Tensor | None:
+    """Return how many steps one agent takes to clear each cell, float32 [B, H, W]; None where it takes one."""
+    told = (each.steps_to_clear(state, world) for each in reversed(world.loop))
+    return next((each for each in told if each is not None), None)
 
 
 def agent_distance(state: WorldState, cells: Tensor) -> Tensor:

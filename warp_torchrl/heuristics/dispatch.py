@@ -9,6 +9,7 @@ from warp_torchrl.heuristics.base import (
     extinguish_or,
     match_cells,
     place,
+    steps_to_clear,
     target_or_base,
 )
 from warp_torchrl.heuristics.coordinated import LAST, Coordinated
@@ -32,7 +33,7 @@ class Dispatch(Coordinated):
     without a target wait.
     """
 
-    effort = 2.0  # steps for each cell of a firebreak: move, clear
+    effort = 2.0  # steps for each cell of a firebreak: move, clear; where lines take time, their steps and the move
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
@@ -66,14 +67,17 @@ class Dispatch(Coordinated):
 
     def _clear(self, state: WorldState, mask: Tensor, who: Tensor) -> Tensor:
         """Return the actions of some agents, bool [A], that clear firebreaks, int64 [B, A]."""
-        todo = cells_to_clear(state, self.world, who, self.effort)
+        steps = steps_to_clear(state, self.world)
+        todo = cells_to_clear(state, self.world, who, self.effort if steps is None else steps + 1.0)
         cells, valid = list_cells(todo)
         gain = (-path_length(state, self.world, cells)).masked_fill(~(valid[:, None] & who[:, None]), -math.inf)
         claims = match_cells(state, cells, gain, spacing=1, discount=2.0, taken=1000.0)
         own = own_cell(state)
-        here = todo.flatten(1).gather(1, own) & mask[..., Action.CLEAR]
+        can = mask[..., Action.CLEAR]
+        goes_on = can & who & (state.vehicles.last_action == int(Action.CLEAR))  # a line that takes several steps
+        here = todo.flatten(1).gather(1, own) & can
         move = first_move(state, self.world, mask, claims)
-        return torch.where(here & ~is_second(own, here), int(Action.CLEAR), move)
+        return torch.where((here & ~is_second(own, here)) | goes_on, int(Action.CLEAR), move)
 
     def _target_or_water(self, state: WorldState, target: Tensor, front: Tensor) -> Tensor:
         """Return the given targets, or water for agents whose tank is empty, or the base where charge runs out.

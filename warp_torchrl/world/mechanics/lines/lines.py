@@ -13,7 +13,6 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.arrays.bytes import scatter_add
 from warp_torchrl.world.arrays.constants import numbers, whole_numbers
 from warp_torchrl.world.behaviour.firebreaks import intensity_of
 from warp_torchrl.world.law.flames import flames_of, heat_of
@@ -127,8 +126,7 @@ class FireLines(Mechanic):
         lines = Lines(
             heat=heat_of(fire, state) if isinstance(fire, RateFire) else None,
             kind=kinds_of(state, world),
-            work=torch.zeros_like(state.cells, dtype=torch.int32),
-            width=torch.zeros_like(state.cells),
+            work=torch.zeros_like(state.cells, dtype=torch.int16),
             means=means.expand(len(state.cells), -1).contiguous(),
             worked=torch.zeros_like(state.step),
             minutes=self._minutes(world),
@@ -160,16 +158,14 @@ class FireLines(Mechanic):
         there = after.replace(cells=state.cells)
         share = torch.where(puts_out, at_fire(there, target, self._pace).share, at_line(there, self._pace).share)
         lines = state.planes(self.name, Lines)
-        made = progress(lines.work, target, puts_out, torch.where(ours, share, 0))
+        widths = whole_numbers(self._widths, target.device)[lines.means]
+        made = progress(lines.work, target, puts_out, torch.where(ours, share, 0), widths)
         undone = result.credited & ours & ~made.done
         kept = {name: getattr(state, name).view(torch.uint8).flatten(1).gather(1, target) for name in _TOUCHED}
         after = _counted(changed(after, target, [(undone, kept)]), state, result, ours, made.works)
         credited = made.first & made.done
-        lines = lines.replace(
-            work=made.work,
-            width=self._widened(lines, target, credited & ~puts_out),
-            worked=lines.worked + made.works.sum(dim=1, dtype=torch.int32),
-        )
+        worked = lines.worked + made.works.sum(dim=1, dtype=torch.int32)
+        lines = lines.replace(work=made.work, worked=worked)
         return after.with_planes(self.name, lines), result.replace(
             credited=torch.where(ours, credited, result.credited), redundant=result.redundant & ~ours
         )
@@ -214,13 +210,6 @@ class FireLines(Mechanic):
         shares = (done[0], line.share * has_tree, done[1], fire.share * has_fire)
         return torch.stack((*(each / DONE for each in shares), flames.clamp(max=3.0)), dim=-1)
 
-    def _widened(self, lines: Lines, target: Tensor, finished: Tensor) -> Tensor:
-        """Return the widths of lines, uint8 [B, H, W], with those that agents, bool [B, A], have finished."""
-        own = numbers((self.hand_width, self.hand_width, self.dozer_width, 0.0), target.device)[lines.means]
-        width = lines.width.flatten(1)
-        change = ((own * 10.0).round().to(torch.uint8) - width.gather(1, target)) * finished
-        return scatter_add(width, target, change).view_as(lines.width)
-
     def _index(self, role: str) -> int:
         """Return what a role works with, its index in ``BUILDERS``, or ``AIRCRAFT``."""
         if role in self.means:
@@ -238,6 +227,11 @@ class FireLines(Mechanic):
         return Pace(self._strongest, intensity_of(self.flame_length), per_intensity, self.gain)
 
     @property
+    def _widths(self) -> tuple[int, ...]:
+        """Return the width of the line of each means [dm]."""
+        return tuple(round(10.0 * each) for each in (self.hand_width, self.hand_width, self.dozer_width, 0.0))
+
+    @property
     def _limits(self) -> tuple[float, ...]:
         """Return the longest flames of each means [m]."""
         return self.hand_limit, self.hand_limit, self.dozer_limit, self.aircraft_limit
@@ -250,7 +244,8 @@ class FireLines(Mechanic):
 
 def line_map(state: WorldState) -> Tensor:
     """Return how much of the line of each cell is done, 0..255, uint8 [B, H, W]; of a finished one 0."""
-    return (state.planes("lines", Lines).work.clamp(min=0) >> 12).clamp(max=255).to(torch.uint8)
+    begun = state.planes("lines", Lines).work.clamp(min=0) * (state.firebreak == 0)
+    return (begun // (DONE // 256)).clamp(max=255).to(torch.uint8)
 
 
 def _counted(after: WorldState, before: WorldState, result: ActionResult, ours: Tensor, works: Tensor) -> WorldState:

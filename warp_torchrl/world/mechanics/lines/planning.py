@@ -30,7 +30,7 @@ def open_fire(state: WorldState, heat: Tensor, limit: float) -> Tensor:
 
 
 def steps_left(state: WorldState, builders: Sequence[int], gain: float) -> Tensor:
-    """Return how many steps of one agent the line of each cell still takes, float32 [B, H, W]; ``MANY`` on steep ground.
+    """Return how many steps of one agent the line of each cell still takes, float32 [B, H, W]; at most ``MANY``.
 
     Args:
         state: The worlds.

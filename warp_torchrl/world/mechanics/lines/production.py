@@ -1,9 +1,9 @@
 """How fast crews and bulldozers build fireline, by fuel model and slope.
 
 Sources of the National Wildfire Coordinating Group (NWCG): sustained rates of crews of 20 with hand tools, for
-construction, burnout and holding, of the Incident Response Pocket Guide, PMS 461; rates of a type 3 bulldozer (90 to 165
-hp) in a single pass, of the Equipment Technology Committee's page on dozers. The numbers of fuel models are those of
-Anderson (1982); the tables that lead other models to them are our reading of their descriptions.
+construction, burnout and holding, from the Incident Response Pocket Guide, PMS 461; rates of a type 3 bulldozer (90 to
+165 hp) in a single pass, from the Equipment Technology Committee's page on dozers. Fuel models have Anderson's numbers
+(1982); the tables that lead other models to them are our reading of their descriptions.
 """
 
 from collections.abc import Mapping

@@ -16,7 +16,7 @@ from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.team.abilities import AgentContext, own_cell, places, youngest_fire
 from warp_torchrl.world.team.acting import is_second
 
-DONE = 1 << 20
+DONE = 1 << 14
 """Parts of the work on a cell."""
 AIRCRAFT = len(BUILDERS)
 """Index of aircraft, which build no line, after the builders."""
@@ -30,8 +30,9 @@ class Lines(Batch):
 
     heat: Tensor | None  # float32 [B,H,W], of an area that burns [kJ/m2]; None under laws without intensity
     kind: Tensor  # uint8 [B,H,W], fuel and slope, see ``production.kinds_of``
-    work: Tensor  # int32 [B,H,W], of ``DONE`` parts: of a line, or below 0 of putting out
-    width: Tensor  # uint8 [B,H,W], of a finished line [dm]; 0 where there is none
+    work: (
+        Tensor  # int16 [B,H,W], of ``DONE`` parts: of a line, or below 0 of putting out; of a firebreak its width [dm]
+    )
     means: Tensor  # int64 [B,A], of each agent: index in ``BUILDERS``, or ``AIRCRAFT``
     worked: Tensor  # int32 [B], steps of agents that got work done
     minutes: float  # of a step
@@ -60,10 +61,10 @@ class Progress(NamedTuple):
     works: Tensor  # bool [B,A], which agents got some done
     first: Tensor  # bool [B,A], which of them are the first at their cell
     done: Tensor  # bool [B,A], whether the cell of each is completed
-    work: Tensor  # int32 [B,H,W], see ``Lines``
+    work: Tensor  # int16 [B,H,W], see ``Lines``
 
 
-def progress(work: Tensor, target: Tensor, puts_out: Tensor, parts: Tensor) -> Progress:
+def progress(work: Tensor, target: Tensor, puts_out: Tensor, parts: Tensor, width: Tensor) -> Progress:
     """Return the work after agents added to it; work on a line is lost where fire came, and on a fire when it is out.
 
     Args:
@@ -71,13 +72,15 @@ def progress(work: Tensor, target: Tensor, puts_out: Tensor, parts: Tensor) -> P
         target: Flat index of each agent's cell, int64 [B, A].
         puts_out: Who puts out fire, bool [B, A]; the others build line.
         parts: That each adds, int64 [B, A]; 0 of who does not work.
+        width: Of the lines of each, int64 [B, A] [dm].
     """
     sign, old = torch.where(puts_out, -1, 1), work.flatten(1).gather(1, target).long()
     same = target[:, :, None] == target[:, None, :]
     total = (sign * old).clamp(min=0) + (same * parts[:, None, :]).sum(dim=-1)
     works, done = parts > 0, total >= DONE
     first = works & ~is_second(target, works)
-    change = torch.where(first, torch.where(done, 0, sign * total) - old, 0).to(torch.int32)
+    new = torch.where(done, torch.where(puts_out, 0, width), sign * total)
+    change = torch.where(first, new - old, 0).to(work.dtype)
     return Progress(works, first, done, work.flatten(1).scatter_add(1, target, change).view_as(work))
 
 
