@@ -150,7 +150,7 @@ class FireLines(Mechanic):
     def around(self, state: WorldState, running: Tensor, acts: Acts) -> tuple[WorldState, ActionResult]:
         """Let the agents act, and take back what their work does not complete.
 
-        Who works with others at one cell is not redundant; the first of those who complete it is credited.
+        Agents that work at one cell are not redundant; the first of them is credited when it is completed.
         """
         after, result = acts(state)
         target, puts_out = result.target, result.action == int(Action.EXTINGUISH)
@@ -171,7 +171,7 @@ class FireLines(Mechanic):
         )
 
     def workable(self, state: WorldState, world: Rules) -> Tensor | None:
-        """Return the burning cells that some agent can go at, bool [B, H, W]; None where all flames are alike."""
+        """Return the burning cells that some agent can work at, bool [B, H, W]; None where all flames are alike."""
         heat, roles = state.planes(self.name, Lines).heat, [ROLES[each] for each in world.team.roles]
         of_roles = zip(world.team.roles, roles, strict=True)
         limits = [self._strongest[self._index(name)] for name, role in of_roles if "extinguish" in role.abilities]
@@ -192,11 +192,11 @@ class FireLines(Mechanic):
         return {"at_work": lines.worked / (state.step * lines.means.shape[1]).clamp(min=1)}
 
     def entries(self, world: Rules) -> tuple[str, ...]:
-        """Return the names of what agents are told of their work."""
+        """Return the names of the numbers on work."""
         return ("line_done", "line_pace", "fire_done", "fire_pace", "flames")
 
     def status(self, state: WorldState) -> Tensor:
-        """Return what each agent is told of its work, float32 [B, A, 5].
+        """Return the numbers on each agent's work, float32 [B, A, 5].
 
         The share done of the line of its cell, and that which a step adds; both of the fire that it would put out; and
         the flames that it would work at over the longest at which it can.

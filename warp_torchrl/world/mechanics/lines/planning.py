@@ -1,4 +1,4 @@
-"""What a planner can know of work: the fires that vehicles can go at, and the time that a line takes."""
+"""Plans of work: the fires that vehicles can work at, and the steps that a line takes."""
 
 from collections.abc import Sequence
 
@@ -17,7 +17,7 @@ MANY = 1e6
 
 
 def open_fire(state: WorldState, heat: Tensor, limit: float) -> Tensor:
-    """Return the burning cells that an agent can go at from a neighbour that is neither fire nor lake, bool [B, H, W].
+    """Return the burning cells that an agent can work at from a neighbour that is neither fire nor lake, bool [B, H, W].
 
     Args:
         state: The worlds.

@@ -1,4 +1,4 @@
-"""How fast crews and bulldozers build fireline, by fuel model and slope.
+"""Rates at which crews and bulldozers build fireline, by fuel model and slope.
 
 Sources of the National Wildfire Coordinating Group (NWCG): sustained rates of crews of 20 with hand tools, for
 construction, burnout and holding, from the Incident Response Pocket Guide, PMS 461; rates of a type 3 bulldozer (90 to

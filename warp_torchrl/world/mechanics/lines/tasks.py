@@ -1,4 +1,4 @@
-"""How much of the work on a cell an agent does in a step, and the flames that it would do it at."""
+"""Tasks of agents: the share of the work on a cell that a step does, and the flames beside it."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -56,7 +56,7 @@ class Task(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """What a step's work comes to."""
+    """The work after a step."""
 
     works: Tensor  # bool [B,A], which agents got some done
     first: Tensor  # bool [B,A], which of them are the first at their cell
@@ -70,8 +70,8 @@ def progress(work: Tensor, target: Tensor, puts_out: Tensor, parts: Tensor, widt
     Args:
         work: Before, see ``Lines``.
         target: Flat index of each agent's cell, int64 [B, A].
-        puts_out: Who puts out fire, bool [B, A]; the others build line.
-        parts: That each adds, int64 [B, A]; 0 of who does not work.
+        puts_out: Which agents put out fire, bool [B, A]; the others build line.
+        parts: That each adds, int64 [B, A]; 0 where an agent does not work.
         width: Of the lines of each, int64 [B, A] [dm].
     """
     sign, old = torch.where(puts_out, -1, 1), work.flatten(1).gather(1, target).long()
