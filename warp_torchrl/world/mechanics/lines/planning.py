@@ -17,7 +17,7 @@ MANY = 1e6
 
 
 def open_fire(state: WorldState, heat: Tensor, limit: float) -> Tensor:
-    """Return the burning cells that an agent can work at from a neighbour that is neither fire nor lake, bool [B, H, W].
+    """Return the burning cells that an agent can work at from a neighbour without fire or lake, bool [B, H, W].
 
     Args:
         state: The worlds.

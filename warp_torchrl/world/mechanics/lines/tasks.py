@@ -30,9 +30,7 @@ class Lines(Batch):
 
     heat: Tensor | None  # float32 [B,H,W], of an area that burns [kJ/m2]; None under laws without intensity
     kind: Tensor  # uint8 [B,H,W], fuel and slope, see ``production.kinds_of``
-    work: (
-        Tensor  # int16 [B,H,W], of ``DONE`` parts: of a line, or below 0 of putting out; of a firebreak its width [dm]
-    )
+    work: Tensor  # int16 [B,H,W], of ``DONE`` parts of a line, below 0 of putting out; of a firebreak its width [dm]
     means: Tensor  # int64 [B,A], of each agent: index in ``BUILDERS``, or ``AIRCRAFT``
     worked: Tensor  # int32 [B], steps of agents that got work done
     minutes: float  # of a step
