@@ -12,10 +12,11 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.arrays.constants import numbers
-from warp_torchrl.world.arrays.geometry import DIRECTIONS
+from warp_torchrl.world.arrays.geometry import DIRECTIONS, offsets
 from warp_torchrl.world.arrays.listing import filled
 from warp_torchrl.world.law.arrivals import terms_of
 from warp_torchrl.world.law.automaton import at_cells
+from warp_torchrl.world.law.cells import is_burning
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import Metric
 from warp_torchrl.world.state.state import WorldState
@@ -60,6 +61,44 @@ def intensity(heat: Tensor, metric: Metric, east: Tensor, north: Tensor, cell_si
     strongest = torch.sqrt(drift_east * drift_east + drift_north * drift_north)
     time = slowness - torch.where(length > 0.0, along, strongest)
     return heat * cell_size / (_SECONDS * time.clamp(min=_LEAST))
+
+
+def front_towards(state: WorldState, heat: Tensor | None, alike: float, cell: Tensor, place: Tensor) -> Tensor:
+    """Return the intensity of the fronts that go from cells to places, float32 [B, n] [kW/m].
+
+    Args:
+        state: The worlds.
+        heat: See ``heat_of``; None under laws without intensity.
+        alike: Intensity of all fire under these [kW/m].
+        cell: Flat index, int64 [B, n].
+        place: (row, column) of each, int64 [B, n, 2]; that of the cell itself gives the head's.
+    """
+    if heat is None:
+        return torch.full(cell.shape, alike, device=cell.device)
+    width, (row, column) = state.cells.shape[2], place.unbind(-1)
+    east, north = column - cell % width, cell.div(width, rounding_mode="floor") - row
+    ways = east.to(heat.dtype), north.to(heat.dtype)
+    return intensity(at_cells(heat, cell), metric_at(state, cell), *ways, state.ground.cell_size)
+
+
+def strongest_into(state: WorldState, heat: Tensor | None, alike: float, cell: Tensor) -> Tensor:
+    """Return the intensity of the strongest front that would come from a burning neighbour, float32 [B, n] [kW/m].
+
+    0 where none burns. The arguments are those of ``front_towards``.
+    """
+    (height, width), away = state.cells.shape[1:], offsets(cell.device)
+    row = cell.div(width, rounding_mode="floor")[..., None] + away[:, 0]
+    column = (cell % width)[..., None] + away[:, 1]
+    inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
+    index = row.clamp(0, height - 1) * width + column.clamp(0, width - 1)
+    burns = is_burning(at_cells(state.cells, index.flatten(1))).view_as(inside) & inside
+    if heat is None:
+        return burns.any(dim=-1) * alike
+    south, east = (each.expand(inside.shape) for each in away.to(heat.dtype).unbind(1))
+    slowness, drift_east, drift_north = (each[..., None] for each in metric_at(state, cell))
+    own = at_cells(heat, cell)[..., None]
+    strong = intensity(own, (slowness, drift_east, drift_north), -east, south, state.ground.cell_size)
+    return (strong * burns).amax(dim=-1)
 
 
 def weakest_way_out(state: WorldState, heat: Tensor, is_way: Tensor) -> Tensor:

@@ -7,11 +7,8 @@ import torch
 
 from tests.conftest import small_world
 from tests.world.drawing import draw
-from warp_torchrl.world.behaviour.fuel_codes import FBP_CODES
-from warp_torchrl.world.behaviour.standard_fuels import anderson_13, scott_burgan_40
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.mechanics.lines.production import BUILDERS, kinds_of, metres_a_minute
-from warp_torchrl.world.mechanics.lines.production import _numbers_of as numbers_of
 
 
 def rates(fuel, percent, model="fbfm40"):
@@ -33,18 +30,3 @@ def test_rates_are_those_of_the_tables():
     assert rates(10, 30.0, "fbfm13") == rates(165, 30.0)
     assert rates(165, 80.0) == [0.0] * 4, "too steep for anybody"
     assert rates(2, 0.0, "fbp") == rates(165, 0.0), "boreal spruce"
-
-
-def test_every_fuel_that_burns_has_a_rate():
-    for model, table in (("fbfm13", anderson_13()), ("fbfm40", scott_burgan_40())):
-        burns = table.fuels.load[:-1].sum(-1) > 0.0
-        assert all(numbers_of(model)[code] for code in table.codes[burns].tolist()), model
-    lacking = [code for code in FBP_CODES.tolist() if not numbers_of("fbp")[code]]
-    assert lacking == [0, 99, *range(100, 107)], "those that do not burn"
-
-
-def test_ground_of_an_unknown_fuel_has_that_of_its_cover():
-    state = draw("TT TT", ground="gf wb")
-    grass, forest, wetland, bare = kinds_of(state, small_world()).flatten().tolist()
-    fuels = [each // 5 for each in (grass, forest, wetland, bare)]
-    assert fuels == [1, 10, 8, 0]

@@ -2,8 +2,8 @@
 
 Sources of the National Wildfire Coordinating Group (NWCG): sustained rates of crews of 20 with hand tools, for
 construction, burnout and holding, from the Incident Response Pocket Guide, PMS 461; rates of a type 3 bulldozer (90 to
-165 hp) in a single pass, from the Equipment Technology Committee's page on dozers. Fuel models have Anderson's numbers
-(1982); the tables that lead other models to them are our reading of their descriptions.
+165 hp) in a single pass, from the Equipment Technology Committee's page on dozers. Fuels have Anderson's numbers
+(``world.law.anderson``).
 """
 
 from collections.abc import Mapping
@@ -12,9 +12,9 @@ from typing import Literal, get_args
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.arrays.constants import numbers, whole_numbers
-from warp_torchrl.world.law.fuel_bed import COVER_FUEL, gradient
-from warp_torchrl.world.law.rate import RateFire
+from warp_torchrl.world.arrays.constants import numbers
+from warp_torchrl.world.law.anderson import NUMBERS, anderson_numbers
+from warp_torchrl.world.law.fuel_bed import gradient
 from warp_torchrl.world.mechanics.mechanic import Rules
 from warp_torchrl.world.state.state import WorldState
 
@@ -25,7 +25,7 @@ CHAIN = 20.1168
 """Metres in a chain."""
 SLOPES = (25.0, 40.0, 55.0, 74.0)
 """Upper bounds of the classes of slope [%]; nobody builds line on steeper ground."""
-_FUELS = 14  # numbers of fuel models, 0 is none
+_FUELS = NUMBERS + 1  # 0 is none
 _CLASSES = len(SLOPES) + 1
 _CREWS: Mapping[Builder, tuple[float, ...]] = {
     "crew1": (30, 24, 5, 5, 6, 6, 4, 7, 28, 6, 15, 7, 5),
@@ -41,49 +41,11 @@ _DOZER: Mapping[tuple[int, ...], tuple[tuple[float, float, float, float], ...]] 
     (10, 13): ((8, 15, 10, 15), (3, 8, 5, 10), (0, 3, 0, 5), (0, 0, 0, 0)),
 }
 """Chains an hour of each class of slope: least and most up the slope, and down it. The mean of the four holds."""
-_LIKE: Mapping[str, Mapping[int, tuple[int, ...]]] = {
-    "fbfm13": {model: (model,) for model in range(1, 14)},
-    "fbfm40": {
-        1: (101, 102, 103, 104),
-        2: (121, 122),
-        3: (105, 106, 107, 108, 109),
-        4: (124, 145, 147, 149),
-        5: (123, 141, 142),
-        6: (143, 144, 146),
-        7: (148, 163),
-        8: (181, 183, 184, 161),
-        9: (182, 186, 188, 189),
-        10: (162, 164, 165, 185, 187),
-        11: (201,),
-        12: (202, 203),
-        13: (204,),
-    },
-    "fbp": {
-        1: (31, 32),
-        8: (1, 3, 5, 6),
-        9: (7, 11, 12, 13),
-        10: (2, 4, 40, 50, 60, 70, 80, 90, *range(400, 1000)),
-        12: (21, 22),
-        13: (23,),
-    },
-}
-"""Codes of each model's fuels by the number of Anderson's that is most like them to a vehicle."""
-_CODES = 1000  # of fuels of any model
 
 
 def kinds_of(state: WorldState, world: Rules) -> Tensor:
-    """Return the kind of ground of each cell, uint8 [B, H, W]: its number of fuel and its class of slope.
-
-    Under law ``rate`` the fuel is that of the map; ground of a code that is not known has the fuel of its cover, and so
-    has all ground under other laws.
-    """
-    fire, cover = world.fire, state.cover
-    fuel = whole_numbers(COVER_FUEL["fbfm13"], cover.device)[cover.long()]
-    if isinstance(fire, RateFire):
-        codes = fire.bed.fuel(state.landscape).long().clamp(0, _CODES - 1)
-        found = whole_numbers(_numbers_of("" if fire.fuel_models else fire.model), cover.device)[codes]
-        fuel = torch.where(found > 0, found, fuel)
-    fuel = torch.where(fuel < _FUELS, fuel, 0)
+    """Return the kind of ground of each cell, uint8 [B, H, W]: its number of fuel and its class of slope."""
+    fuel, cover = anderson_numbers(world.fire, state.landscape), state.cover
     rise = gradient(state.landscape.elevation, cover, state.ground.cell_size)
     steep = 100.0 * torch.sqrt(rise[:, 0] * rise[:, 0] + rise[:, 1] * rise[:, 1])
     return (fuel * _CLASSES + torch.bucketize(steep, numbers(SLOPES, steep.device))).to(torch.uint8)
@@ -95,12 +57,6 @@ def metres_a_minute(kind: Tensor, builder: Tensor) -> Tensor:
     Of the index after the last it is 0.
     """
     return numbers(_RATES, kind.device)[builder * (_FUELS * _CLASSES) + kind.long()]
-
-
-def _numbers_of(model: str) -> tuple[int, ...]:
-    """Return the number of Anderson's model for each code of a model's fuels, 0 where there is none."""
-    of_code = {code: number for number, codes in _LIKE.get(model, {}).items() for code in codes}
-    return tuple(of_code.get(code, 0) for code in range(_CODES))
 
 
 def _chains_an_hour(builder: Builder, fuel: int, slope: int) -> float:

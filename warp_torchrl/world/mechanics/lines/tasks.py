@@ -8,12 +8,10 @@ from torch import Tensor
 
 from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.constants import numbers
-from warp_torchrl.world.arrays.geometry import offsets
-from warp_torchrl.world.law.flames import intensity, metric_at
+from warp_torchrl.world.law.flames import front_towards, strongest_into
 from warp_torchrl.world.mechanics.lines.production import BUILDERS, metres_a_minute
-from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.state import WorldState
-from warp_torchrl.world.team.abilities import AgentContext, own_cell, places, youngest_fire
+from warp_torchrl.world.team.abilities import AgentContext, own_cell, youngest_fire
 from warp_torchrl.world.team.acting import is_second
 
 DONE = 1 << 14
@@ -89,13 +87,8 @@ def fire_beside(state: WorldState) -> tuple[Tensor, Tensor]:
 
 def at_fire(state: WorldState, target: Tensor, pace: Pace) -> Task:
     """Return the task to put out fires, int64 [B, A], whose fronts go towards the agents."""
-    lines, size, width = state.planes("lines", Lines), state.ground.cell_size, state.cells.shape[2]
-    strong = torch.full_like(target, pace.alike, dtype=torch.float32)
-    if lines.heat is not None:
-        row, column = state.vehicles.position.unbind(-1)
-        east, north = column - target % width, target.div(width, rounding_mode="floor") - row
-        heat = AgentContext.at(lines.heat, target)
-        strong = intensity(heat, metric_at(state, target), east.to(heat.dtype), north.to(heat.dtype), size)
+    lines, size = state.planes("lines", Lines), state.ground.cell_size
+    strong = front_towards(state, lines.heat, pace.alike, target, state.vehicles.position)
     minutes = strong * (pace.seconds * size / 60.0)
     share = (DONE * lines.minutes / minutes.clamp(min=1e-6)).clamp(1.0, DONE).long()
     return _within(strong, torch.where(lines.means == AIRCRAFT, DONE, share), lines, pace)
@@ -103,20 +96,11 @@ def at_fire(state: WorldState, target: Tensor, pace: Pace) -> Task:
 
 def at_line(state: WorldState, pace: Pace) -> Task:
     """Return the task to clear the agents' own cells, at the strongest front that would come from a neighbour."""
-    lines, size, own = state.planes("lines", Lines), state.ground.cell_size, own_cell(state)
-    away = offsets(own.device)
-    index, inside = places(state, away.T)
-    burns = is_burning(AgentContext.at(state.cells, index.flatten(1))).view_as(inside) & inside
-    strong = torch.full_like(index, pace.alike, dtype=torch.float32)
-    if lines.heat is not None:
-        south, east = (each.expand(inside.shape) for each in away.to(torch.float32).unbind(1))
-        slowness, drift_east, drift_north = (each[..., None] for each in metric_at(state, own))
-        heat = AgentContext.at(lines.heat, own)[..., None]
-        strong = intensity(heat, (slowness, drift_east, drift_north), -east, south, size)
+    lines, own = state.planes("lines", Lines), own_cell(state)
     rate = metres_a_minute(AgentContext.at(lines.kind, own), lines.means)
-    share = rate * (DONE * pace.gain * lines.minutes / size)
+    share = rate * (DONE * pace.gain * lines.minutes / state.ground.cell_size)
     share = torch.where(rate > 0.0, share.clamp(1.0, DONE), 0.0).long()
-    return _within((strong * burns).amax(dim=-1), share, lines, pace)
+    return _within(strongest_into(state, lines.heat, pace.alike, own), share, lines, pace)
 
 
 def _within(strong: Tensor, share: Tensor, lines: Lines, pace: Pace) -> Task:
