@@ -47,7 +47,7 @@ class Pace(NamedTuple):
 class Task(NamedTuple):
     """What agents can do where they are, [B, A] each."""
 
-    intensity: Tensor  # float32, of the flames that they would work at [kW/m]; 0 without fire
+    intensity: Tensor  # float32, of the flames that they would work at [kW/m]; 0 without any that matter
     share: Tensor  # int64, of ``DONE`` parts in a step; 0 where flames or ground forbid it
 
 
@@ -100,6 +100,8 @@ def at_line(state: WorldState, pace: Pace) -> Task:
     rate = metres_a_minute(AgentContext.at(lines.kind, own), lines.means)
     share = rate * (DONE * pace.gain * lines.minutes / state.ground.cell_size)
     share = torch.where(rate > 0.0, share.clamp(1.0, DONE), 0.0).long()
+    if lines.heat is None and pace.alike <= min(pace.strongest):  # no flames matter
+        return Task(torch.zeros_like(rate), share)
     return _within(strongest_into(state, lines.heat, pace.alike, own), share, lines, pace)
 
 
