@@ -8,7 +8,7 @@ import pytest
 
 from tests.test_docs import ROOT, run
 
-APART = ("agencies", "belief", "breach", "embers", "flight", "lines", "radio", "retardant", "sensing")
+APART = ("agencies", "belief", "breach", "drops", "embers", "flight", "lines", "radio", "retardant", "sensing")
 """Mechanics whose folder can be deleted."""
 TRY = """
 import pkgutil, importlib, warp_torchrl

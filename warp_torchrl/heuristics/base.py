@@ -152,7 +152,16 @@ def target_or_supply(state: WorldState, world: World, target: Tensor) -> Tensor:
         return target
     water = mark_base(state, state.landscape.cover == Cover.LAKE)
     _, index = nearest(state.vehicles.position, water)
-    return torch.where((state.vehicles.tank == 0)[..., None], place(index, state), target)
+    supply = base_or_water(state, world, place(index, state))
+    return torch.where((state.vehicles.tank == 0)[..., None], supply, target)
+
+
+def base_or_water(state: WorldState, world: World, water: Tensor) -> Tensor:
+    """Return the places of water, int64 [B, A, 2], but the base for agents whose tanks fill there alone."""
+    for each in world.loop:
+        at_base = each.fills_at_base(state)
+        water = water if at_base is None else torch.where(at_base[..., None], state.vehicles.base[:, None], water)
+    return water
 
 
 def claim_cells(state: WorldState, cells: Tensor, value: Tensor, spacing: int, discount: float, taken: float) -> Tensor:

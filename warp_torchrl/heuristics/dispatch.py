@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.heuristics.base import (
+    base_or_water,
     extinguish_or,
     match_cells,
     place,
@@ -91,4 +92,4 @@ class Dispatch(Coordinated):
         way = path_length(state, self.world, water) + moves_from(front, is_open(state), water)[:, None]
         nearest = way.masked_fill_(~valid[:, None], math.inf).argmin(dim=-1)
         is_empty = (state.vehicles.tank == 0)[..., None]
-        return torch.where(is_empty, place(water.gather(1, nearest), state), target)
+        return torch.where(is_empty, base_or_water(state, self.world, place(water.gather(1, nearest), state)), target)

@@ -212,6 +212,10 @@ class Mechanic:
         """
         return None
 
+    def fills_at_base(self, state: WorldState) -> Tensor | None:
+        """Return whose tanks fill at the base alone, bool [B, A]; None where all fill at lakes too."""
+        return None
+
     def workable(self, state: WorldState, world: Rules) -> Tensor | None:
         """Return the burning cells that some agent can put out from a cell beside them, bool [B, H, W].
 
