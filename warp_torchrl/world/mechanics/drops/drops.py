@@ -183,7 +183,8 @@ class Drops(Mechanic):
 
     def after_tick(self, state: WorldState, ticks_now: Tensor, world: Rules) -> WorldState:
         """Return worlds whose covered trees do not catch fire in the next tick, where the coverage holds."""
-        return advance_rows(state, ticks_now, lambda rows, ticks: held(rows, ticks, self._load))
+        is_covered = (state.planes(self.name, Loads).coverage > 0.0).flatten(1).any(dim=1)
+        return advance_rows(state, ticks_now & is_covered, lambda rows, ticks: held(rows, ticks, self._load))
 
     def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
         """Return ``on_target``."""

@@ -9,7 +9,7 @@ from torch import Tensor
 from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.constants import whole_numbers
 from warp_torchrl.world.arrays.geometry import grow, offsets
-from warp_torchrl.world.arrays.listing import filled, first_cells
+from warp_torchrl.world.arrays.listing import first_cells
 from warp_torchrl.world.behaviour.firebreaks import intensity_of
 from warp_torchrl.world.law.automaton import at_cells
 from warp_torchrl.world.law.flames import front_towards, strongest_into
@@ -21,8 +21,8 @@ LITRES_PER_LEVEL = 0.40746
 """Litres to a square metre in a coverage level of 1, a US gallon to 100 square feet."""
 _NEEDED = (1, 1, 2, 2, 8, 3, 6, 6, 2, 2, 4, 3, 8, 8)
 """Coverage level by Anderson's number, 0 first; 8 where the source says more than 6."""
-_SHARE = 64
-"""One in so many cells of a map is covered and beside fire in a tick at most."""
+_SHARE, _FEWEST = 256, 16
+"""One in so many cells of a map is covered and beside fire in a tick at most, or as many as that on a small one."""
 LEAST = 0.05
 """Coverage level that counts as none."""
 
@@ -90,10 +90,10 @@ def held(state: WorldState, ticks_now: Tensor, load: Load) -> WorldState:
     The coverage decays, and holds the fronts beside trees or not.
     """
     loads, here = state.planes("drops", Loads), ticks_now[:, None, None]
-    coverage = torch.where(here, loads.coverage * 0.5 ** (loads.minutes / load.half_life), loads.coverage)
-    coverage = torch.where(coverage > LEAST, coverage, 0.0)
+    coverage = loads.coverage * torch.where(here, 0.5 ** (loads.minutes / load.half_life), 1.0)
+    coverage = coverage * (coverage > LEAST)
     near = here & (coverage > 0.0) & is_tree(state.cells) & grow(is_burning(state.cells))
-    cell, is_near = first_cells(near, filled(near[0].numel() // _SHARE))
+    cell, is_near = first_cells(near, max(_FEWEST, near[0].numel() // _SHARE))
     front = strongest_into(state, loads.heat, load.alike, cell)
     holds = front <= held_intensity(at_cells(coverage, cell), at_cells(loads.fuel, cell), load)
     after = changed(state, cell, [(is_near & holds, {"wet": at_cells(state.wet, cell).clamp(min=1)})])
