@@ -73,14 +73,14 @@ def fallen(
     cell, falls = cells.flatten(1), (on_map & dropped[..., None]).flatten(1)
     place = there.vehicles.position[:, :, None].expand(-1, -1, count, -1).flatten(1, 2)
     front = front_towards(there, loads.heat, load.alike, cell, place)
-    level = torch.full_like(front, load.level)
+    most = held_intensity(torch.full_like(front, load.level), at_cells(loads.fuel, cell), load)
     codes, wet = at_cells(after.cells, cell), at_cells(after.wet, cell).clamp(min=1)
     burns = (codes >= FIRST_FIRE) & (codes <= loads.last_spreading)
-    out = falls & burns & (front <= held_intensity(level, at_cells(loads.fuel, cell), load))
-    out, trees = (each & ~is_second(cell, each) for each in (out, falls & is_tree(codes)))
+    stands = is_tree(codes) & (strongest_into(after, loads.heat, load.alike, cell) <= most)
+    out, stands = (each & ~is_second(cell, each) for each in (falls & burns & (front <= most), falls & stands))
     becomes: dict[str, Tensor | int] = {"cells": at_cells(after.age, cell), "age": 0, "extinguished": 1, "wet": wet}
-    after = changed(after, cell, [(out, becomes), (trees, {"wet": wet})])
-    coverage = loads.coverage.flatten(1).scatter_reduce(1, cell, level * falls, "amax").view_as(loads.coverage)
+    after = changed(after, cell, [(out, becomes), (stands, {"wet": wet})])
+    coverage = loads.coverage.flatten(1).scatter_reduce(1, cell, load.level * falls, "amax").view_as(loads.coverage)
     return after, out.view_as(cells).any(dim=-1), coverage
 
 
