@@ -8,7 +8,10 @@ import pytest
 
 from tests.test_docs import ROOT, run
 
-APART = ("agencies", "arrivals", "belief", "breach", "embers", "flight", "radio", "retardant", "sensing", "values")
+APART = (
+    *("agencies", "arrivals", "belief", "breach", "drops", "embers", "flight", "lines", "radio", "retardant"),
+    *("sensing", "values"),
+)
 """Mechanics whose folder can be deleted."""
 TRY = """
 import pkgutil, importlib, warp_torchrl

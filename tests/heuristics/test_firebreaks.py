@@ -55,6 +55,14 @@ def test_the_way_to_the_ring_takes_time() -> None:
     assert torch.equal(planned(env, state), square(2))
 
 
+def test_cells_that_take_longer_count_for_more() -> None:
+    env, state = scene(MEADOW, at=[(4, 3)] * 4)
+    effort, clears = torch.full(state.cells.shape, 2.0), torch.tensor([True] * 4)
+    assert torch.equal(cells_to_clear(state, env.world, clears, effort)[0], square(1))
+    effort[0, 3, 3] = 8.0  # 22 / 4 = 5.5 steps; fire comes after 5
+    assert torch.equal(cells_to_clear(state, env.world, clears, effort)[0], square(2))
+
+
 def test_a_later_state_goes_on_with_what_was_cleared() -> None:
     env, state = scene(MEADOW, at=[(4, 3)] * 3)
     done = square(2)

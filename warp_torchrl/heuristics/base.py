@@ -29,8 +29,22 @@ def idle_action(mask: Tensor, team: Team) -> Tensor:
 
 
 def can_be_put_out(state: WorldState, world: World) -> Tensor:
-    """Return the burning cells that an agent can extinguish, bool [B, H, W]."""
-    return is_burning(state.cells) & (state.cells <= world.fire.last_spreading)
+    """Return the burning cells that an agent can extinguish, bool [B, H, W].
+
+    Those at which mechanics let nobody work (``Mechanic.workable``) are left out in worlds that have others.
+    """
+    fire = is_burning(state.cells) & (state.cells <= world.fire.last_spreading)
+    for each in world.loop:
+        able = each.workable(state, world)
+        if able is not None:
+            fire = torch.where((fire & able).flatten(1).any(dim=1)[:, None, None], fire & able, fire)
+    return fire
+
+
+def steps_to_clear(state: WorldState, world: World) -> Tensor | None:
+    """Return how many steps one agent takes to clear each cell, float32 [B, H, W]; None where it takes one."""
+    told = (each.steps_to_clear(state, world) for each in reversed(world.loop))
+    return next((each for each in told if each is not None), None)
 
 
 def agent_distance(state: WorldState, cells: Tensor) -> Tensor:
@@ -139,7 +153,16 @@ def target_or_supply(state: WorldState, world: World, target: Tensor) -> Tensor:
         return target
     water = mark_base(state, state.landscape.cover == Cover.LAKE)
     _, index = nearest(state.vehicles.position, water)
-    return torch.where((state.vehicles.tank == 0)[..., None], place(index, state), target)
+    supply = base_or_water(state, world, place(index, state))
+    return torch.where((state.vehicles.tank == 0)[..., None], supply, target)
+
+
+def base_or_water(state: WorldState, world: World, water: Tensor) -> Tensor:
+    """Return the places of water, int64 [B, A, 2], but the base for agents whose tanks fill there alone."""
+    for each in world.loop:
+        at_base = each.fills_at_base(state)
+        water = water if at_base is None else torch.where(at_base[..., None], state.vehicles.base[:, None], water)
+    return water
 
 
 def claim_cells(state: WorldState, cells: Tensor, value: Tensor, spacing: int, discount: float, taken: float) -> Tensor:

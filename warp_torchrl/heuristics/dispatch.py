@@ -6,9 +6,11 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.heuristics.base import (
+    base_or_water,
     extinguish_or,
     match_cells,
     place,
+    steps_to_clear,
     target_or_base,
 )
 from warp_torchrl.heuristics.coordinated import LAST, Coordinated
@@ -32,7 +34,7 @@ class Dispatch(Coordinated):
     without a target wait.
     """
 
-    effort = 2.0  # steps for each cell of a firebreak: move, clear
+    effort = 2.0  # steps for each cell of a firebreak: move, clear; where lines take time, their steps and the move
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
@@ -70,14 +72,17 @@ class Dispatch(Coordinated):
 
     def _clear(self, state: WorldState, mask: Tensor, who: Tensor) -> Tensor:
         """Return the actions of some agents, bool [A], that clear firebreaks, int64 [B, A]."""
-        todo = cells_to_clear(state, self.world, who, self.effort)
+        steps = steps_to_clear(state, self.world)
+        todo = cells_to_clear(state, self.world, who, self.effort if steps is None else steps + 1.0)
         cells, valid = list_cells(todo)
         gain = (-path_length(state, self.world, cells)).masked_fill(~(valid[:, None] & who[:, None]), -math.inf)
         claims = match_cells(state, cells, gain, spacing=1, discount=2.0, taken=1000.0)
         own = own_cell(state)
-        here = todo.flatten(1).gather(1, own) & mask[..., Action.CLEAR]
+        can = mask[..., Action.CLEAR]
+        goes_on = can & who & (state.vehicles.last_action == int(Action.CLEAR))  # a line that takes several steps
+        here = todo.flatten(1).gather(1, own) & can
         move = first_move(state, self.world, mask, claims)
-        return torch.where(here & ~is_second(own, here), int(Action.CLEAR), move)
+        return torch.where((here & ~is_second(own, here)) | goes_on, int(Action.CLEAR), move)
 
     def _target_or_water(self, state: WorldState, target: Tensor, front: Tensor) -> Tensor:
         """Return the given targets, or water for agents whose tank is empty, or the base where charge runs out.
@@ -91,4 +96,4 @@ class Dispatch(Coordinated):
         way = path_length(state, self.world, water) + moves_from(front, is_open(state), water)[:, None]
         nearest = way.masked_fill_(~valid[:, None], math.inf).argmin(dim=-1)
         is_empty = (state.vehicles.tank == 0)[..., None]
-        return torch.where(is_empty, place(water.gather(1, nearest), state), target)
+        return torch.where(is_empty, base_or_water(state, self.world, place(water.gather(1, nearest), state)), target)

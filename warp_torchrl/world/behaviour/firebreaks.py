@@ -25,6 +25,19 @@ def breach_chance(intensity: Tensor, width: float, trees: Tensor, length: float)
     return -torch.expm1(-length / _PLOT * torch.nn.functional.softplus(x))
 
 
+def holds_up_to(draw: Tensor, width: Tensor, trees: bool, length: float) -> Tensor:
+    """Return the intensity up to which parts of firebreaks hold, float32 [kW/m]: the inverse of ``breach_chance``.
+
+    Args:
+        draw: Uniform in [0, 1): the part is breached by fires whose chance is higher.
+        width: See there, float32 [m].
+        trees: See there.
+        length: See there.
+    """
+    x = torch.expm1(-torch.log1p(-draw) * (_PLOT / length)).log() + (0.38 if trees else 0.99) * width
+    return torch.where(x < 1.36 + 0.00036 * _STRONGEST, (x - 1.36) / 0.00036, torch.inf)
+
+
 def intensity_of(flame_length: float) -> float:
     """Return the fireline intensity of flames of a length [m], (L / 0.0775)^(1 / 0.46) [kW/m] (Byram 1959)."""
     return float((flame_length / 0.0775) ** (1.0 / 0.46))

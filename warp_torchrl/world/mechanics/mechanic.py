@@ -216,6 +216,24 @@ class Mechanic:
         """
         return None
 
+    def fills_at_base(self, state: WorldState) -> Tensor | None:
+        """Return whose tanks fill at the base alone, bool [B, A]; None where all fill at lakes too."""
+        return None
+
+    def workable(self, state: WorldState, world: Rules) -> Tensor | None:
+        """Return the burning cells that some agent can put out from a cell beside them, bool [B, H, W].
+
+        None where the mechanic forbids none. Heuristics leave the others.
+        """
+        return None
+
+    def steps_to_clear(self, state: WorldState, world: Rules) -> Tensor | None:
+        """Return how many steps of one agent it takes to clear each cell from now on, float32 [B, H, W], 1 or more.
+
+        None where it takes one; the last mechanic that answers is heard.
+        """
+        return None
+
     def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
         """Return the rows of its metrics."""
         return ()

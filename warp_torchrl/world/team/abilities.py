@@ -156,18 +156,8 @@ class Extinguish(Ability):
 
     @staticmethod
     def nearby_fire(now: AgentContext) -> tuple[Tensor, Tensor]:
-        """Return the youngest fire of each agent's 3 x 3 neighbourhood.
-
-        Ties go to the agent's own cell, then in row-major order.
-
-        Returns:
-            Flat index of the cell, int64 [B, A], and whether there is one that can be put out, bool [B, A].
-        """
-        index, inside = neighbourhood(now.state)
-        codes = now.at(now.state.cells, index.flatten(1)).view_as(index).to(torch.int64)
-        fits = inside & (codes >= FIRST_FIRE) & (codes <= now.last_spreading)
-        best = torch.where(fits, codes * 16 + _order(codes.device), 1 << 20).argmin(dim=-1, keepdim=True)
-        return index.gather(-1, best)[..., 0], fits.any(dim=-1)
+        """Return the fire that each agent would put out, see ``youngest_fire``."""
+        return youngest_fire(now.state, now.last_spreading)
 
 
 @ability("clear")
@@ -187,6 +177,25 @@ class Clear(Ability):
 
 PAPER_ABILITIES = tuple(ABILITIES)
 """Those of WARP-CA, whose ten actions every team has: a vehicle whose role lacks one is shown it as closed."""
+
+
+def youngest_fire(state: WorldState, last_spreading: int) -> tuple[Tensor, Tensor]:
+    """Return the youngest fire of each agent's 3 x 3 neighbourhood.
+
+    Ties go to the agent's own cell, then in row-major order.
+
+    Args:
+        state: The worlds.
+        last_spreading: Cell code of the last stage that can be put out.
+
+    Returns:
+        Flat index of the cell, int64 [B, A], and whether there is one that can be put out, bool [B, A].
+    """
+    index, inside = neighbourhood(state)
+    codes = AgentContext.at(state.cells, index.flatten(1)).view_as(index).to(torch.int64)
+    fits = inside & (codes >= FIRST_FIRE) & (codes <= last_spreading)
+    best = torch.where(fits, codes * 16 + _order(codes.device), 1 << 20).argmin(dim=-1, keepdim=True)
+    return index.gather(-1, best)[..., 0], fits.any(dim=-1)
 
 
 def own_cell(state: WorldState) -> Tensor:

@@ -11,7 +11,7 @@ from warp_torchrl.world.arrays.geometry import grow, neighbour_in
 from warp_torchrl.world.arrays.listing import filled, first_cells
 from warp_torchrl.world.arrays.random import Stream, named_key, uniform
 from warp_torchrl.world.backends.backend import advance_rows
-from warp_torchrl.world.behaviour.firebreaks import breach_chance, intensity_of
+from warp_torchrl.world.behaviour.firebreaks import holds_up_to, intensity_of
 from warp_torchrl.world.ignition.intervention import ignited
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.law.fronts import front_at
@@ -40,7 +40,8 @@ class Breach(Mechanic):
     are those of the front as it came to the cell beside it; the other laws have one length of flames.
 
     Attributes:
-        width: Of a firebreak [m]; None: the side of a cell.
+        width: Of a firebreak [m]; None: the side of a cell. Where mechanic ``lines`` builds them, each has the width of
+            who finished it.
         flame_length: Of flames under laws other than ``rate`` [m].
 
     Raises:
@@ -82,17 +83,24 @@ class Breach(Mechanic):
 
     def _reach(self, state: WorldState, ticks_now: Tensor, fire: Automaton) -> WorldState:
         size, trees = state.ground.cell_size, state.cover == int(Cover.FOREST)
-        width = size if self.width is None else self.width
-        held = uniform(named_key(state.key, self.name), 0, Stream.NAMED, (state.cells.shape[1], state.cells.shape[2]))
-        chance = breach_chance(self._intensity(state, fire), width, trees, size)
-        lit = torch.zeros_like(trees)
+        draw = uniform(named_key(state.key, self.name), 0, Stream.NAMED, (state.cells.shape[1], state.cells.shape[2]))
+        among_trees, in_open = (holds_up_to(draw, self._widths(state), each, size) for each in (True, False))
+        intensity = self._intensity(state, fire)
+        burns, lit = intensity > -torch.inf, torch.zeros_like(trees)
         for direction in range(8):  # fire comes from the cell behind a firebreak's, and goes to the one before it
             behind = (direction + 4) % 8
-            breached = state.firebreak & (held < neighbour_in(behind, chance))
+            held = torch.where(neighbour_in(behind, trees), among_trees, in_open)
+            breached = state.firebreak & neighbour_in(behind, burns) & (neighbour_in(behind, intensity) > held)
             lit = lit | neighbour_in(behind, breached)
         after = ignited(state, fire, lit & ticks_now[:, None, None])
         new = (after.cells != state.cells).flatten(1).sum(dim=1, dtype=torch.int32)
         return after.with_planes(self.name, Breaches(state.planes(self.name, Breaches).count + new))
+
+    def _widths(self, state: WorldState) -> Tensor:
+        """Return the widths of firebreaks, float32 [B, H, W] [m]; anything elsewhere."""
+        width = torch.full_like(state.alpha, state.ground.cell_size if self.width is None else self.width)
+        built = state.plane("lines", "work")
+        return width if built is None else torch.where(built > 0, built * 0.1, width)
 
     def _intensity(self, state: WorldState, fire: Automaton) -> Tensor:
         """Return the intensity of fire in each burning cell beside a firebreak, float32 [B, H, W] [kW/m]; else -inf."""

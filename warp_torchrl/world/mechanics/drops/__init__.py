@@ -1,0 +1,1 @@
+"""Drops: water and retardant from aircraft."""
