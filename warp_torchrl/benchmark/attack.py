@@ -25,7 +25,7 @@ METRIC = "escaped"
 POLICIES = ("noop", "local", "coordinated", "dispatch")
 AXES = {"winds": "wind [m/s]", "minutes": "vehicles come after [min]", "vehicles": "vehicles"}
 """What is varied, and what tables and figures call it."""
-VALUES = {"winds": (0.0, 4.0, 8.0, 12.0), "minutes": (10.0, 30.0, 60.0, 120.0), "vehicles": (2.0, 4.0, 8.0, 16.0)}
+VALUES = {"winds": (0.0, 4.0, 8.0, 12.0), "minutes": (10.0, 30.0, 60.0, 120.0), "vehicles": (3.0, 6.0, 9.0, 12.0)}
 """Values by default."""
 
 
