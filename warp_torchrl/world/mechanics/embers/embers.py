@@ -58,6 +58,8 @@ class _Landing(NamedTuple):
 class Embers(Mechanic):
     """Firebrands that start fires downwind.
 
+    One in 64 cells of a map throws in a tick at most, but up to 64 cells of any map.
+
     Attributes:
         firebrands: Those of law ``rate``.
         chance: Under the other laws, that a burning tree throws a firebrand in a tick of the paper.

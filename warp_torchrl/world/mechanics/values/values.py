@@ -65,7 +65,8 @@ class Values(Mechanic):
             is known: it depends on roof, vents and gardens. 0 leaves embers out.
         flame_length: Of flames under laws other than ``rate`` [m].
         escape_area: A fire that is larger has escaped [ha]: the 100 acres from which class D begins (NWCG PMS 205).
-        rates: Cost of a vehicle by role [US dollars an hour]; roles that are not named have those of ``RATES``.
+        rates: Cost of a vehicle by role [US dollars an hour]; of roles that are not named 250 for ugv, 2000 uav, 500
+            scout, 7000 tanker.
         minutes_per_tick: Under laws without minutes; None: 10.
 
     Raises:
