@@ -176,8 +176,9 @@ def test_the_whole_array_runs_in_every_scenario(scenario, tmp_path):
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_every_scenario_is_a_run(scenario):
     plan = run_config(plain(compose_config("train", [f"scenario={scenario}"])))
-    steps = 48 if scenario == "haksar" else 8  # fires there are played until they are out
-    assert plan.scenario == scenario and plan.world.horizon == steps * plan.world.size[0]
+    side = plan.world.size[0]
+    ends = {"haksar": 48 * side, "initial_attack": 360}  # fires are played until they are out; for six hours
+    assert plan.scenario == scenario and plan.world.horizon == ends.get(scenario, 8 * side)
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)

@@ -4,7 +4,15 @@ import pytest
 import torch
 
 from tests.world.drawing import draw
-from warp_torchrl.world.law.flames import flames_of, heat_of, intensity, metric_at, weakest_way_out
+from warp_torchrl.world.law.flames import (
+    flames_of,
+    front_towards,
+    heat_of,
+    intensity,
+    metric_at,
+    strongest_into,
+    weakest_way_out,
+)
 from warp_torchrl.world.law.passing import head_behaviour
 from warp_torchrl.world.law.rate import RateFire
 
@@ -28,6 +36,18 @@ def test_a_front_has_the_intensity_of_the_head_along_the_wind_and_of_the_rear_ag
     assert intensity(heat, metric, ways["none"], ways["none"], size).item() == pytest.approx(along.item(), rel=1e-4)
     assert against.item() == pytest.approx((then.intensity * then.backing / then.head).item(), rel=1e-4)
     assert (heat * head.head[0] / 60.0).item() == pytest.approx(along.item(), rel=1e-4)
+
+
+def test_fronts_towards_places_and_into_cells_are_those_of_the_way():
+    north, south = torch.tensor([[[0, 1]]]), torch.tensor([[[2, 1]]])
+    state = field(wind=(0.0, 8.0))
+    heat = heat_of(FIRE, state)
+    ahead, behind = (front_towards(state, heat, 0.0, MIDDLE, place) for place in (north, south))
+    assert ahead.item() > 4.0 * behind.item() > 0.0, "the wind blows to the north"
+    into = strongest_into(state, heat, 0.0, torch.tensor([[1, 7, 4]]))
+    assert into[0].tolist() == pytest.approx([ahead.item(), behind.item(), 0.0])
+    assert strongest_into(state, None, 9.0, torch.tensor([[1, 4]])).tolist() == [[9.0, 0.0]]
+    assert front_towards(state, None, 9.0, MIDDLE, north).tolist() == [[9.0]]
 
 
 def test_the_weakest_way_out_is_against_the_wind_where_it_is_open():

@@ -10,7 +10,7 @@ from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.mechanics.lines.lines import FireLines
-from warp_torchrl.world.mechanics.lines.tasks import DONE, Lines
+from warp_torchrl.world.mechanics.lines.tasks import DONE, Lines, progress
 from warp_torchrl.world.state.state import Action
 from warp_torchrl.world.team.team import Team
 
@@ -74,6 +74,13 @@ def test_work_is_left_where_it_was_done_until_fire_comes():
     burning = state.cells.clone()
     burning[0, 0, 0] = 11
     assert lines.status(state.replace(cells=burning, age=burning - 1))[0, 0, 2] == 0.0, "nothing is put out of its fire"
+
+
+def test_work_on_a_line_does_not_count_for_the_fire_that_comes():
+    work, target = torch.full((1, 2, 2), 700, dtype=torch.int16), torch.tensor([[3, 3]])
+    fire, parts, width = torch.tensor([[True, True]]), torch.tensor([[100, 50]]), torch.zeros(1, 2, dtype=torch.int64)
+    assert progress(work, target, fire, parts, width).work[0].tolist() == [[700, 700], [700, -150]]
+    assert progress(work, target, ~fire, parts, width).work[0, 1, 1] == 850
 
 
 def test_to_put_out_takes_the_water_for_its_heat():

@@ -9,6 +9,7 @@ from tests.world.mechanics.there import needs
 from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.heuristics.base import can_be_put_out
 from warp_torchrl.world.air.wind import Calm
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.mechanics.lines.lines import FireLines
@@ -55,6 +56,19 @@ def test_dispatch_finishes_a_line_that_it_has_begun():
         state = env.world.step(state, torch.tensor([acts[-1:]])).after
     first = acts.index(CLEAR)
     assert set(acts[first:]) == {CLEAR} and len(acts[first:]) == 5, "6 m of 30 a minute"
+
+
+def test_dispatch_goes_on_with_a_line_that_its_plan_has_left():
+    env, state = meadow((0, 0), lines=FireLines(means={"ugv": "crew2"}), tank=0)
+    assert chosen(env, state, "dispatch") != [CLEAR]
+    last = torch.full_like(state.vehicles.last_action, CLEAR)
+    assert chosen(env, state.replace(vehicles=state.vehicles.replace(last_action=last)), "dispatch") == [CLEAR]
+
+
+def test_where_nobody_can_work_at_any_fire_all_count():
+    env, state = meadow((4, 3), lines=FireLines(hand_limit=0.0, means={"ugv": "crew1"}))
+    assert not env.world.mechanics[0].workable(state, env.world).any()
+    assert can_be_put_out(state, env.world).sum() == 1
 
 
 @pytest.mark.parametrize("name", ["greedy", "coordinated", "dispatch"])

@@ -6,7 +6,6 @@ that the coverage holds go out; trees do not catch fire as long as the coverage 
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar, Literal
 
 import torch
@@ -222,7 +221,7 @@ class Drops(Mechanic):
         share = block_means(state.planes(self.name, Loads).coverage > LEAST, side)
         return share[:, None, None].expand(-1, state.vehicles.tank.shape[1], -1, -1, -1)
 
-    @cached_property
+    @property
     def _load(self) -> Load:
         half_life = {"water": 15.0, "retardant": 120.0}[self.agent] if self.half_life is None else self.half_life
         area = self.litres / (LITRES_PER_LEVEL * self.level)

@@ -7,8 +7,9 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.arrays.batch import Batch
+from warp_torchrl.world.arrays.blocks import sums_about
 from warp_torchrl.world.arrays.constants import whole_numbers
-from warp_torchrl.world.arrays.geometry import grow, offsets
+from warp_torchrl.world.arrays.geometry import offsets
 from warp_torchrl.world.arrays.listing import first_cells
 from warp_torchrl.world.behaviour.firebreaks import intensity_of
 from warp_torchrl.world.law.automaton import at_cells
@@ -92,7 +93,8 @@ def held(state: WorldState, ticks_now: Tensor, load: Load) -> WorldState:
     loads, here = state.planes("drops", Loads), ticks_now[:, None, None]
     coverage = loads.coverage * torch.where(here, 0.5 ** (loads.minutes / load.half_life), 1.0)
     coverage = coverage * (coverage > LEAST)
-    near = here & (coverage > 0.0) & is_tree(state.cells) & grow(is_burning(state.cells))
+    by_fire = sums_about(is_burning(state.cells).to(coverage.dtype)[:, None], 1)[:, 0] > 0.5
+    near = here & (coverage > 0.0) & is_tree(state.cells) & by_fire
     cell, is_near = first_cells(near, max(_FEWEST, near[0].numel() // _SHARE))
     front = strongest_into(state, loads.heat, load.alike, cell)
     holds = front <= held_intensity(at_cells(coverage, cell), at_cells(loads.fuel, cell), load)

@@ -6,7 +6,6 @@ Agents at one cell add up, and work stays where it was left.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import ClassVar, Literal
 
 import torch
@@ -221,7 +220,7 @@ class FireLines(Mechanic):
         fire = world.fire
         return (fire.minutes if isinstance(fire, RateFire) else self.minutes_per_tick) / world.steps_per_tick
 
-    @cached_property
+    @property
     def _pace(self) -> Pace:
         per_intensity = self.flaming / (self.water * self.efficiency * LATENT)
         return Pace(self._strongest, intensity_of(self.flame_length), per_intensity, self.gain)
