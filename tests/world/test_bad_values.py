@@ -154,7 +154,7 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
             (World, part)
             for part in (
                 *("landscape", "wind", "fire", "team", "ignition", "sensing", "belief", "agencies", "mechanics"),
-                "action_masking",
+                *("action_masking", "goal"),  # a run knows the metrics: evaluation.goal
             )
         ),
     }
