@@ -1,5 +1,7 @@
 """The tactics of initial attack on fires drawn by hand, and what they read of the wind."""
 
+from dataclasses import dataclass
+
 import pytest
 import torch
 
@@ -7,6 +9,15 @@ from tests.heuristics.drawing import chosen, scene
 from tests.world.drawing import draw
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.heuristics.tactics import along_axis
+from warp_torchrl.world.arrays.batch import Batch
+
+
+@dataclass(eq=False, repr=False)
+class Told(Batch):
+    """What a mechanic of values tells."""
+
+    worth: torch.Tensor
+
 
 LONG = "TTTTTTTTTTTTT TTTTTTTTTTTTT TTTTTaaaTTTTT TTTTTTTTTTTTT TTTTTTTTTTTTT"
 """A fire of three cells whose middle is in row 2, column 6."""
@@ -73,3 +84,4 @@ def test_a_point_is_protected_before_nearer_fire():
     with_assets = state.replace(ground=state.ground.replace(landscape=landscape))
     assert chosen(env, state, "point_protection")[0].endswith("WEST"), "without assets it is dispatch"
     assert chosen(env, with_assets, "point_protection")[0].endswith("EAST")
+    assert chosen(env, state.with_planes("values", Told(assets)), "point_protection")[0].endswith("EAST")

@@ -116,9 +116,10 @@ class PointProtection(Dispatch):
     def value(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """Return each cell's value [cells of way], float32 [B, H, W], and the fire that can be put out."""
         value, front = super().value(state)
-        if state.landscape.layer("assets") is None:
+        told = state.plane("values", "worth")
+        if told is None and state.landscape.layer("assets") is None:
             return value, front
-        worth = worth_of(state)
+        worth = worth_of(state) if told is None else told
         near = worth / worth.flatten(1).amax(dim=1).clamp(min=1e-9)[:, None, None]
         for _ in range(_REACH):
             near = torch.maximum(near, max_pool2d(near, 3, stride=1, padding=1) - 1.0 / _REACH)
