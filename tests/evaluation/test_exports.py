@@ -10,6 +10,7 @@ from tests.evaluation.test_summary import write
 from warp_torchrl.evaluation.exports import curves, marl_eval, rliable, seed_bands
 from warp_torchrl.evaluation.rows import read_rows
 from warp_torchrl.evaluation.summary import main
+from warp_torchrl.world.mechanics.mechanic import Metric
 
 
 def trained(folder, saved, evaluated, **options):
@@ -50,6 +51,16 @@ def test_rliable_gets_scores_by_run_and_task_of_policies_that_have_all(runs):
     assert found["frames"] == [200, 300] and found["curves"] == {"mappo": [[[0.2, 0.6], [0.1, 0.2]]]}
     with pytest.raises(ValueError, match="no policy was evaluated on all of other, tiny"):
         rliable([entry for entry in read_rows(runs) if (entry.scenario == "tiny") == (entry.policy == "local")])
+
+
+def test_a_goal_that_no_training_logs_has_no_curves_and_less_of_it_is_a_higher_score(runs):
+    entries = [each._replace(goal=Metric("escaped", "less")) for each in read_rows(runs)]
+    found = rliable(entries)
+    assert np.allclose(found["scores"]["mappo"], [[-0.6, -0.2]]) and found["frames"] == [] and found["curves"] == {}
+    assert marl_eval(entries)["warp_torchrl"]["tiny"]["mappo"]["seed_1"] == {
+        "step_0": {"step_count": 0, "escaped": [0.7, 0.9]},
+        "absolute_metrics": {"escaped": [0.7, 0.9], "success": [1.0, 1.0]},
+    }
 
 
 def test_a_curve_has_the_interval_of_its_mean_over_seeds(runs):

@@ -17,7 +17,7 @@ from warp_torchrl.evaluation.statistics import interval
 from warp_torchrl.system import disk
 
 ENVIRONMENT = "warp_torchrl"
-_EVALUATED = "evaluation/saved"
+_EVALUATED, _SAVED = "evaluation/saved", "saved"
 
 
 def curves(entry: SummaryRow) -> tuple[np.ndarray, np.ndarray]:
@@ -40,6 +40,11 @@ def curves(entry: SummaryRow) -> tuple[np.ndarray, np.ndarray]:
     return np.array(steps, np.int64), np.array([[each[step] for step in steps] for each in values])
 
 
+def _of_goal(entry: SummaryRow) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ``curves`` of what a scenario's policies are compared by: none but of the forest saved is logged."""
+    return curves(entry) if entry.goal.name == _SAVED else (np.empty(0, np.int64), np.empty((len(entry.value), 0)))
+
+
 def _by_step(table: dict[str, np.ndarray], column: str) -> dict[int, float]:
     values = table.get(column, np.full_like(table[FRAMES], np.nan))
     return {int(step): float(value) for step, value in zip(table[FRAMES], values, strict=True) if np.isfinite(value)}
@@ -54,7 +59,7 @@ def marl_eval(entries: Sequence[SummaryRow]) -> dict[str, Any]:
     tasks: dict[str, Any] = {}
     for scenario in dict.fromkeys(entry.scenario for entry in entries):
         group = [entry for entry in entries if entry.scenario == scenario]
-        found = [curves(entry) for entry in group]
+        found = [_of_goal(entry) for entry in group]
         shared = _shared_steps(found)
         tasks[scenario] = {
             entry.policy: {f"seed_{run}": _run(entry, run, shared, curve) for run in range(len(entry.value))}
@@ -85,8 +90,8 @@ def rliable(entries: Sequence[SummaryRow]) -> dict[str, Any]:
 
     Returns:
         ``tasks``, the scenarios; ``scores``, by policy [runs, tasks], the mean of each run's last evaluation, of as
-        many runs as all its tasks have; and ``frames`` with ``curves``, by policy [runs, tasks, steps], at the steps
-        that all trainings have.
+        many runs as all its tasks have, and its negative where less is better; and ``frames`` with ``curves``, by
+        policy [runs, tasks, steps], at the steps that all trainings have.
 
     Raises:
         ValueError: If no policy was evaluated on every task.
@@ -98,8 +103,8 @@ def rliable(entries: Sequence[SummaryRow]) -> dict[str, Any]:
     whole = {policy: [each[task] for task in tasks] for policy, each in by_policy.items() if len(each) == len(tasks)}
     if not whole:
         raise ValueError(f"no policy was evaluated on all of {', '.join(tasks)}")
-    scores = {policy: _stacked([entry.value.mean(axis=1) for entry in rows]) for policy, rows in whole.items()}
-    found = {policy: [curves(entry) for entry in rows] for policy, rows in whole.items() if rows[0].folders}
+    scores = {policy: _stacked([_scores(entry) for entry in rows]) for policy, rows in whole.items()}
+    found = {policy: [_of_goal(entry) for entry in rows] for policy, rows in whole.items() if rows[0].folders}
     steps = _shared_steps([each for rows in found.values() for each in rows])
     trained = {policy: rows for policy, rows in found.items() if steps and all(each.size for each, _ in rows)}
     over_steps = {
@@ -107,6 +112,12 @@ def rliable(entries: Sequence[SummaryRow]) -> dict[str, Any]:
         for policy, rows in trained.items()
     }
     return {"tasks": tasks, "scores": scores, "frames": steps, "curves": over_steps}
+
+
+def _scores(entry: SummaryRow) -> np.ndarray:
+    """Return the mean of each run's last evaluation, more of which is better, float64 [runs]."""
+    means: np.ndarray = entry.value.mean(axis=1)
+    return -means if entry.goal.better == "less" else means
 
 
 def _stacked(tasks: Sequence[np.ndarray]) -> list[Any]:
