@@ -46,6 +46,7 @@ def without(folder: Path, *names: str) -> Path:
         for path in (copy / "conf").rglob("*.yaml"):
             path.write_text(re.sub(rf"^mechanics: {{{name}: .*}}\n", "", path.read_text(), flags=re.MULTILINE))
         delete_options(copy, f"world.mechanics.{name}.")
+        delete_options(copy, f"\n  {name}: {{")  # of scenarios with several
     return copy
 
 
