@@ -11,8 +11,8 @@ observation and the mask of one vehicle, and memory or messages where it has the
 
     measured=[FOLDER, ...]   evaluations of this very policy that its manifest and card keep; that of its run is kept
 
-``average=OTHER`` gives it the mean of the parameters of both. Of a training and of what it started from, that is
-often better than either (Wortsman et al. 2022, "Model soups"): docs/results.md.
+``average=OTHER`` gives it the mean of the parameters of both policies. The mean of a trained policy and of the one that
+its training started from often saves more than either (Wortsman et al. 2022, "Model soups").
 """
 
 import argparse
