@@ -40,6 +40,7 @@ SMALL = {
     "cover": {"size": 24},
     "isotropy": {"reach": 12, "worlds": 4},
     "ellipses": {"speeds": (0.0, 5.0), "reach": 12, "worlds": 6},
+    "burned_by_wind": {"speeds": (0.0, 6.0), "ticks": 24, "worlds": 2},
     "house": {},
     "belief": {"times": (0, 1), "overrides": ("landscape.size=16", "belief.hidden=4")},
     "fire_sizes": {"size": 24, "trees_per_strike": 20, "fires": 60, "discard": 5},

@@ -25,7 +25,7 @@ BAD = [
     (Uniform, "speed", 61.0, "speed must be in [0, 60], got 61.0"),
     (Fire, "growth", 1, "growth must be true or false, got 1"),
     (Fire, "neighbours", 7, "neighbours must be 4 or 8, got 7"),
-    (Fire, "kernel", "elipse", "kernel must be alexandridis or ellipse, got 'elipse': did you mean ellipse?"),
+    (Fire, "kernel", "elipse", "kernel must be alexandridis or ellipse or fbp, got 'elipse': did you mean ellipse?"),
     (Ignition, "count", 1.5, "count must be a whole number, got 1.5"),
     (Perlin, "scale", (1.0, 2.0, 3.0), "scale must be a number or a list of 2 values, got (1.0, 2.0, 3.0)"),
     (Mlp, "actor_hidden", 64, "actor_hidden must be a list of a whole number, got 64"),

@@ -22,7 +22,7 @@ from drawings.fires import fire_plain, fire_terrain_wind
 from drawings.hills import hills
 from drawings.house import house
 from drawings.landscapes import burn_probability
-from drawings.laws import ellipses, fire_sizes, isotropy
+from drawings.laws import burned_by_wind, ellipses, fire_sizes, isotropy
 from drawings.terrain import cover, noise, noise_scales
 from drawings.winds import wind
 from warp_torchrl.commands.failure import DONE, fail
@@ -48,6 +48,7 @@ WORLD: dict[str, Callable[..., "Figure"]] = {
     "cover": cover,
     "isotropy": isotropy,
     "ellipses": ellipses,
+    "burned_by_wind": burned_by_wind,
     "fire_sizes": fire_sizes,
     "house": house,
     "belief": belief,

@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from drawings.measures import (
+    burned_in_wind,
     diagonal_over_axis,
     fires_in_wind,
     fitted_exponent,
@@ -18,6 +19,7 @@ from warp_torchrl.env.pictures.drawing import (
     BLUE,
     CELL,
     INK,
+    PURPLE,
     VERMILION,
     contours,
     fire_image,
@@ -30,7 +32,7 @@ from warp_torchrl.env.pictures.drawing import (
 )
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
-from warp_torchrl.world.law.wind_and_slope import length_to_breadth
+from warp_torchrl.world.law.wind_and_slope import head_factor, length_to_breadth
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,7 +41,7 @@ if TYPE_CHECKING:
 _FRONTS = {  # the automaton of each panel of ``isotropy``
     "law paper, diagonal unit": Fire(diagonal="unit"),
     "law paper, diagonal distance": Fire(),
-    "law hazard, k = 8": HazardFire(),
+    "law hazard, k = 8": HazardFire(alpha=Fire.alpha, refinement=8),
 }
 
 
@@ -99,6 +101,35 @@ def ellipses(speeds: tuple[float, ...] = (0.0, 2.5, 5.0, 7.5, 10.0), reach: int 
     return figure
 
 
+def burned_by_wind(
+    speeds: tuple[float, ...] = (0.0, 1.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0), ticks: int = 200, worlds: int = 16
+) -> "Figure":
+    """Area burned in the same time by the speed of the wind, for each of its factors (ours).
+
+    Law hazard as it is by default, but for the kernel; of ``fbp`` in three bearings to the grid.
+    """
+    title = f"Area burned in {ticks} ticks of law hazard, over that in calm air"
+    figure, axes = sheet([["area", "head"]], (8.6, 3.3), title)
+    for name, (kernel, bearing, look) in _WINDS.items():
+        fire = HazardFire(kernel=kernel)
+        found = [burned_in_wind(fire, speed, bearing, ticks, worlds) for speed in speeds]
+        for part, axis in zip(zip(*found), axes.values()):
+            axis.plot(speeds, [each / part[0] for each in part], label=name, **look)
+    axes["head"].plot(speeds, head_factor(torch.tensor(speeds), "C-7", 94.0), color=INK, label="Canadian system, C-7")
+    for axis, name in zip(axes.values(), ("burned area", "distance of the head")):
+        axis.set(xlabel="wind speed [m/s]", ylabel="over calm", title=name, yscale="log")
+        axis.spines[["top", "right"]].set_visible(False)
+    axes["head"].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return figure
+
+
+_WINDS = {
+    "fbp, along the grid": ("fbp", 0.0, {"color": BLUE, "marker": "o"}),
+    "fbp, at 22.5 degrees": ("fbp", 22.5, {"color": BLUE, "marker": "^", "linestyle": "--"}),
+    "fbp, at 45 degrees": ("fbp", 45.0, {"color": BLUE, "marker": "s", "linestyle": ":"}),
+    "ellipse, along the grid": ("ellipse", 0.0, {"color": VERMILION, "marker": "o"}),
+    "alexandridis, along the grid": ("alexandridis", 0.0, {"color": PURPLE, "marker": "o"}),
+}
 _KERNELS = {"ellipse": {"color": BLUE, "marker": "o"}, "alexandridis": {"color": VERMILION, "marker": "s"}}
 
 

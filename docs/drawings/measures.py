@@ -127,6 +127,37 @@ def fires_in_wind(
     return burned, lit
 
 
+def burned_in_wind(
+    fire: HazardFire, speed: float, bearing: float, ticks: int, worlds: int, seed: int = 0
+) -> tuple[float, float]:
+    """Return what a fire in a forest burns in a time, and how far its head comes; means over worlds [cells].
+
+    Args:
+        fire: The law.
+        speed: Of the wind [m/s].
+        bearing: Where it blows to, counter-clockwise from east [degrees].
+        ticks: The time.
+        worlds: Worlds that the means are taken over.
+        seed: Seed of the first world.
+
+    Raises:
+        ValueError: If a fire reaches the map's border.
+    """
+    angle = math.radians(bearing)
+    east, north = math.cos(angle), math.sin(angle)
+    far = 40 + round(ticks * min(1.0, 0.1 + speed / 10.0))
+    lit = (round(far * north) + 40, 40)
+    size = (lit[0] + 41, round(far * east) + 81)
+    history = point_fires(fire, size, lit, ticks=ticks, worlds=worlds, wind=(speed * east, speed * north), seed=seed)
+    burned = history.arrival >= 0
+    if any(side.any() for side in (burned[:, 0], burned[:, -1], burned[:, :, 0], burned[:, :, -1])):
+        raise ValueError(f"ticks must leave fires on the map, got {ticks}")
+    rows, columns = (torch.arange(side) - middle for side, middle in zip(size, lit))
+    along = columns * east - rows[:, None] * north
+    head = torch.where(burned, along, -math.inf).flatten(1).amax(dim=1)
+    return burned.sum(dim=(1, 2)).float().mean().item(), head.mean().item()
+
+
 def length_over_breadth(burned: Tensor) -> float:
     """Return the length over the breadth of where a fire in a west wind burns with probability 0.5 or more.
 

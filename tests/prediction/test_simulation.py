@@ -68,7 +68,7 @@ def test_simulate_takes_components_and_elevation():
         ({"cell_size": 0.0}, "cell_size must be"),
         ({"cell_size": float("nan")}, "cell_size must be"),
         ({"stage_age": torch.zeros(2, 9, 8, dtype=torch.uint8)}, "stage_age must have the shape"),
-        ({"stage_age": torch.full((2, 9, 9), 8, dtype=torch.uint8), "fire": "hazard"}, "stage_age must be under 8"),
+        ({"stage_age": torch.full((2, 9, 9), 24, dtype=torch.uint8), "fire": "hazard"}, "stage_age must be under 24"),
         ({"stage_age": torch.ones(2, 9, 9, dtype=torch.uint8)}, "stage_age must be under 1 "),
     ],
 )

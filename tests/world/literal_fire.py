@@ -5,6 +5,7 @@ Written from the specification alone, to be compared with the tensor code.
 
 import math
 from dataclasses import dataclass, field
+from functools import cache
 
 LAKE, WETLAND, GRASSLAND, FOREST, BARE = range(5)
 NEIGHBOURS = [(row, column) for row in (-1, 0, 1) for column in (-1, 0, 1) if (row, column) != (0, 0)]
@@ -70,6 +71,8 @@ class LiteralFire:
             return math.exp(0.045 * speed) * math.exp(0.131 * speed * (cosine - 1.0))
         ratio = 1.0 + 8.729 * (1.0 - math.exp(-0.030 * 3.6 * speed)) ** 2.155
         eccentricity = math.sqrt(1.0 - 1.0 / ratio**2)
+        if self.kernel == "fbp":
+            return fbp_factor(speed, math.acos(max(-1.0, min(1.0, cosine))), ratio, eccentricity)
         return (math.exp(0.16 * speed) * (1.0 - eccentricity) / (1.0 - eccentricity * cosine)) ** 1.67
 
     def in_a_tick(self, chance: float) -> float:
@@ -131,3 +134,21 @@ class LiteralFire:
             return {11: ignites, code: 1.0 - ignites}
         grows = (1.0 - ignites) * self.in_a_tick(math.exp(-code / self.oldest * 5.0))
         return {11: ignites, code + 1: grows, code: 1.0 - ignites - grows}
+
+
+@cache
+def fbp_factor(speed: float, angle: float, ratio: float, eccentricity: float, parts: int = 2_000) -> float:
+    """Return w_d of kernel ``fbp`` for C-7 at FFMC 94, its means by sums over small parts of 45 degrees."""
+
+    def mean(about: float, power: int) -> float:
+        turns = (about + ((part + 0.5) / parts - 0.5) * math.pi / 4 for part in range(parts))
+        return sum((1.0 - eccentricity * math.cos(turn)) ** -power for turn in turns) / parts
+
+    moisture = 147.2 * (101 - 94) / (59.5 + 94)
+    fine = 91.9 * math.exp(-0.1386 * moisture) * (1.0 + moisture**5.31 / 4.93e7)
+    kmh = 3.6 * speed
+    effect = math.exp(0.05039 * kmh) if kmh <= 40.0 else 12.0 * (1.0 - math.exp(-0.0818 * (kmh - 28.0)))
+    head = (1.0 - math.exp(-0.0305 * 0.208 * fine * effect)) / (1.0 - math.exp(-0.0305 * 0.208 * fine))
+    first, second = (mean(angle, power) / mean(0.0, power) for power in (1, 2))
+    share = eccentricity**2
+    return head**2 * (1.0 + 3.2 * (1.0 - 1.0 / ratio)) * ((1.0 - share) * first + share * second)

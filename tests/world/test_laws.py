@@ -5,6 +5,7 @@ its deviation from seed to seed, found from six seeds.
 """
 
 import math
+from itertools import pairwise
 
 import pytest
 import torch
@@ -15,6 +16,7 @@ from warp_torchrl.world.backends.tick import in_wind
 from warp_torchrl.world.fires.burn import burn, start_burning, trace
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
+from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.wind_and_slope import length_to_breadth
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.state import Landscape, WorldState
@@ -32,14 +34,15 @@ def grassland(
     wind: Uniform = CALM,
     degrees: float = 0.0,
     radius: int = 1,
+    cover: int = 2,
     seed: int = 0,
 ) -> WorldState:
-    """Return worlds of old trees on grassland that climbs to the east, a patch of them on fire."""
+    """Return worlds of old trees on ground of one cover that climbs to the east, a patch of them on fire."""
     cells = torch.full((worlds, *size), 10, dtype=torch.uint8)
     cells[:, lit[0] - radius : lit[0] + radius + 1, lit[1] - radius : lit[1] + radius + 1] = 11
     climb = 30.0 * math.tan(math.radians(degrees)) * torch.arange(float(size[1]))
     return start_burning(
-        Landscape(torch.full_like(cells, 2), cells, climb.expand(worlds, *size) if degrees else None),
+        Landscape(torch.full_like(cells, cover), cells, climb.expand(worlds, *size) if degrees else None),
         wind=wind,
         fire=fire,
         first_tick=0,
@@ -94,7 +97,7 @@ def diagonal_over_axis(fire: Fire, ticks: int, seed: int = 0) -> float:
 def test_under_law_hazard_a_calm_fire_is_round(alpha: float, paper_ticks: int) -> None:
     # Diagonal over axis in [0.95, 1.06]: 1.014 +- 0.008 for alpha 0.33 and 1.001 +- 0.010 for 0.8, so the bounds lie
     # four deviations away or more; false alarm under 1e-4.
-    fire = HazardFire(alpha=(0.0, 0.0, alpha, 0.0, 0.0))
+    fire = HazardFire(alpha=(0.0, 0.0, alpha, 0.0, 0.0), refinement=8)
     assert 0.95 <= diagonal_over_axis(fire, 8 * paper_ticks) <= 1.06
 
 
@@ -120,7 +123,7 @@ def head_speed(fire: Fire, metres_a_second: float, ticks: int, seed: int = 0) ->
 FIRES = {
     "paper, alexandridis": (Fire(alpha=(0.0, 0.0, 0.15, 0.0, 0.0)), 160),
     "paper, ellipse": (Fire(kernel="ellipse", alpha=(0.0, 0.0, 0.15, 0.0, 0.0)), 160),
-    "hazard, alexandridis": (hazard_fire(32), 260),
+    "hazard, alexandridis": (hazard_fire(32, kernel="alexandridis"), 260),
     "hazard, ellipse": (hazard_fire(32, kernel="ellipse"), 260),
 }
 
@@ -177,6 +180,29 @@ def test_ellipses_have_the_canadian_length_to_breadth(metres_a_second: float, di
     ratio = length_over_breadth(metres_a_second, diagonal) / wanted
     allowed = 0.3 if diagonal else 0.2
     assert 1.0 - allowed <= ratio <= 1.0 + allowed
+
+
+# Burned area, by the wind.
+
+BEARINGS = [0.0, 22.5, 45.0]
+
+
+def burned_by(fire: Fire | RateFire, metres_a_second: float, bearing: float, ticks: int, seed: int = 0) -> float:
+    """Return how much of a forest has burned after so many ticks, from 3 x 3 cells [cells]."""
+    speed, angle = metres_a_second, math.radians(bearing)
+    wind = constant_wind(speed * math.cos(angle), speed * math.sin(angle))
+    side, lit = (97, (48, 48)) if speed < 5.0 else (190, (150, 40))  # no fire leaves the map
+    state = grassland(fire, (side, side), lit, worlds=8, wind=wind, seed=seed, cover=3)
+    burned = trace(state, fire, wind, ticks, 30.0).arrival >= 0
+    assert not any(side.any() for side in (burned[:, 0], burned[:, -1], burned[:, :, 0], burned[:, :, -1]))
+    return burned.sum(dim=(1, 2)).float().mean().item()
+
+
+@pytest.mark.parametrize("bearing", BEARINGS)
+def test_under_law_hazard_more_wind_burns_more(bearing: float) -> None:
+    areas = [burned_by(HazardFire(), speed, bearing, 150) for speed in (0.0, 2.0, 4.0, 8.0, 12.0)]
+    print(bearing, areas)
+    assert all(later > 1.2 * earlier for earlier, later in pairwise(areas)), areas
 
 
 # Slope.
@@ -282,12 +308,13 @@ def test_fire_sizes_in_the_limit_of_drossel_and_schwabl_follow_a_power_law() -> 
 def every_fire() -> list[Fire]:
     options = [
         {"kernel": kernel, "neighbours": neighbours, "diagonal": diagonal, "burning_stages": stages}
-        for kernel in ("alexandridis", "ellipse")
+        for kernel in ("alexandridis", "ellipse", "fbp")
         for neighbours in (4, 8)
         for diagonal in ("distance", "unit")
         for stages in (4, 5)
     ]
-    return [Fire(**each) for each in options] + [HazardFire(refinement=k, **each) for each in options for k in (1, 8)]
+    hazards = [HazardFire(refinement=k, alpha=Fire.alpha, **each) for each in options for k in (1, 8)]
+    return [Fire(**each) for each in options] + hazards
 
 
 def in_short(fire: Fire) -> str:

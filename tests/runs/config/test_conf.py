@@ -140,7 +140,7 @@ def test_a_file_that_builds_on_another_keeps_its_values_and_has_its_own_class_s_
     (tmp_path / "top.yaml").write_text(built_on)
     with initialize_config_dir(str(tmp_path), version_base="1.3"):
         fire = compose("top")
-    assert (fire.beta, fire.tau, fire.refinement, fire.slope_gain) == (0.5, 3.0, 8, 0.115)
+    assert (fire.beta, fire.tau, fire.refinement, fire.slope_gain) == (0.5, 3.0, 24, 0.115)
 
 
 @pytest.mark.parametrize(

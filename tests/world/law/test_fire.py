@@ -64,6 +64,8 @@ def field_of_the_paper() -> Tensor:
 
 
 LEVEL = [[0.0] * 6] * 5
+PLAIN = {"alpha": Fire.alpha, "kernel": "alexandridis"}
+"""What the paper has, for law hazard."""
 
 
 def a_wind(name: str) -> Tensor:
@@ -80,11 +82,16 @@ VARIANTS = {
     "no growth, no lightning, no regrowth": ("field", Fire()),
     "four neighbours": ("uniform", Fire(growth=True, beta=9.0, neighbours=4)),
     "ellipse": ("field", Fire(growth=True, kernel="ellipse")),
-    "hazard": ("uniform", HazardFire(growth=True, beta=9.0, p_regrow=0.2)),
+    "hazard": ("uniform", HazardFire(growth=True, beta=9.0, p_regrow=0.2, refinement=8, **PLAIN)),
+    "hazard, fbp": ("uniform", HazardFire(refinement=3, alpha=Fire.alpha)),
     "level": ("uniform", Fire(growth=True, beta=9.0, p_regrow=0.2)),
-    "level, hazard": ("uniform", HazardFire(refinement=3)),
+    "level, hazard": ("uniform", HazardFire(refinement=3, **PLAIN)),
     "level, four neighbours, unit diagonal": ("uniform", Fire(neighbours=4, diagonal="unit")),
-    "hazard, ellipse, three ticks": ("field", HazardFire(kernel="ellipse", refinement=3, burning_stages=5)),
+    "hazard, ellipse, three ticks": (
+        "field",
+        HazardFire(kernel="ellipse", refinement=3, burning_stages=5, alpha=Fire.alpha),
+    ),
+    "fbp": ("field", Fire(growth=True, kernel="fbp")),
 }
 STAGE_AGE = [[2, 0, 0, 0, 0, 0], [0, 0, 0, 1, 0, 0], [0] * 6, [0] * 6, [0, 0, 0, 1, 0, 0]]
 
@@ -490,22 +497,30 @@ def test_a_fire_dies_for_good_only_without_lightning() -> None:
 
 def test_a_hazard_by_hand() -> None:
     # Forest 0.8, k 8: h = -ln 0.2 / 8 = 0.201180; p = 1 - exp(-h) = 0.182235, and 1 - exp(-h / sqrt 2) = 0.132600.
-    state = draw("TTT TaT TTT", ground="fff fff fff", fire=HazardFire())
+    fire = HazardFire(alpha=Fire.alpha, refinement=8)
+    state = draw("TTT TaT TTT", ground="fff fff fff", fire=fire)
     side, corner = 0.182235, 0.132600
     wanted = torch.tensor([[corner, side, corner], [side, 0.0, side], [corner, side, corner]])
-    torch.testing.assert_close(chance(HazardFire(), state)[0], wanted, atol=1e-6, rtol=0)
+    torch.testing.assert_close(chance(fire, state)[0], wanted, atol=1e-6, rtol=0)
+
+
+def test_the_hazards_of_the_covers_keep_the_ratios_of_the_paper_s() -> None:
+    # Wetland, grassland and forest: -ln 0.9, -ln 0.05 and -ln 0.2, over that of forest; alpha has two digits.
+    hazards = [-math.log(1.0 - each) for each in HazardFire().alpha[1:4]]
+    assert [each / hazards[2] for each in hazards] == pytest.approx([0.0655, 1.861, 1.0], rel=0.03)
 
 
 def test_flammability_over_0_95_counts_as_0_95() -> None:
     # -ln 0.05 / 8 = 0.374467; 1 - exp(-0.374467) = 0.312344.
-    state = draw("aT", ground="gg", fire=HazardFire())
-    assert chance(HazardFire(), state)[0, 0, 1].item() == pytest.approx(0.312344, abs=1e-6)
+    fire = HazardFire(alpha=Fire.alpha, refinement=8)
+    state = draw("aT", ground="gg", fire=fire)
+    assert chance(fire, state)[0, 0, 1].item() == pytest.approx(0.312344, abs=1e-6)
 
 
 @pytest.mark.parametrize("refinement", [1, 3, 8])
 def test_what_a_fire_passes_on_in_its_life_does_not_depend_on_the_refinement(refinement: int) -> None:
     # Wetland 0.1 over four stages: 1 - 0.9^4 = 0.3439. 20 000 pairs; standard error 0.00336, five of them: 6e-7.
-    fire = HazardFire(refinement=refinement)
+    fire = HazardFire(refinement=refinement, alpha=Fire.alpha)
     state = draw(tiled("aT. ...", 10, 20), ground=tiled("www www", 10, 20), fire=fire, worlds=100)
     state = after_ticks(fire, state, 4 * refinement)
     reached = state.cells[:, ::2, 1::3] != 10

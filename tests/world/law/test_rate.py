@@ -1,6 +1,7 @@
 """Law rate: ellipses of the told rate, and a fire that is fought."""
 
 import math
+from itertools import pairwise
 
 import pytest
 import torch
@@ -115,6 +116,27 @@ def test_a_constant_weather_in_hours_is_one_weather() -> None:
 
 
 @pytest.mark.slow
+def burned_by(model: str, fuel: int, speed: float, minutes: float) -> int:
+    """Return how much of a map of one fuel has burned after so many minutes [cells]."""
+    fire, ground = law(model=model), forest(201, fuel)
+    wind = speed * torch.tensor([math.cos(0.4), math.sin(0.4)])
+    lit = torch.zeros(201, 201, dtype=torch.bool)
+    lit[100, 100] = True
+    (arrival,) = arrival_minutes(fire, ground, lit, world_key(torch.arange(1)), [Spell(wind, minutes)], 30.0)
+    return int((arrival <= minutes).sum())
+
+
+@pytest.mark.parametrize(
+    ("model", "fuel", "minutes", "calmest"),
+    [("fbfm40", 165, 120.0, 0.0), ("fbfm40", 122, 60.0, 0.0), ("fbfm13", 10, 300.0, 0.0), ("fbp", C2, 30.0, 2.0)],
+)
+def test_more_wind_burns_more(model: str, fuel: int, minutes: float, calmest: float) -> None:
+    # The Canadian system's own ellipses are narrower at 1 and 2 m/s than their heads are faster.
+    speeds = [speed for speed in (0.0, 1.0, 2.0, 4.0, 8.0, 12.0) if speed >= calmest]
+    areas = [burned_by(model, fuel, speed, minutes) for speed in speeds]
+    assert all(later > 1.1 * earlier for earlier, later in pairwise(areas)), areas
+
+
 def test_a_slope_makes_an_ellipse_without_wind() -> None:
     size, fire = 61, law()
     ground = forest(size).replace(elevation=torch.arange(size).flip(0)[None, :, None].expand(1, size, size) * 15.0)

@@ -6,9 +6,23 @@ import pytest
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.law.wind_and_slope import alexandridis, ellipse, length_to_breadth, slope_factor
+from warp_torchrl.world.law.wind_and_slope import (
+    alexandridis,
+    ellipse,
+    fbp,
+    head_factor,
+    length_to_breadth,
+    slope_factor,
+)
 
 EAST, NORTH_EAST, NORTH, WEST = 2, 1, 0, 6
+
+
+KERNELS = [
+    lambda wind: alexandridis(wind, 0.045, 0.131),
+    lambda wind: ellipse(wind, 0.16),
+    lambda wind: fbp(wind, "C-7", 94.0),
+]
 
 
 def a_wind(u: float, v: float) -> Tensor:
@@ -18,6 +32,7 @@ def a_wind(u: float, v: float) -> Tensor:
 def test_without_wind_every_factor_is_exactly_one() -> None:
     assert torch.equal(alexandridis(a_wind(0.0, 0.0), 0.045, 0.131), torch.ones(1, 8, 1, 1))
     assert torch.equal(ellipse(a_wind(0.0, 0.0), 0.16), torch.ones(1, 8, 1, 1))
+    assert torch.equal(fbp(a_wind(0.0, 0.0), "C-7", 94.0), torch.ones(1, 8, 1, 1))
 
 
 def test_the_length_to_breadth_by_hand() -> None:
@@ -36,6 +51,22 @@ def test_the_ellipse_by_hand() -> None:
     assert found == pytest.approx([3.8037, 0.077334, 0.026407], rel=1e-3)
 
 
+def test_the_head_of_the_canadian_system_by_hand() -> None:
+    # FFMC 94: m = 147.2 * 7 / 153.5 = 6.7127, f(F) = 91.9 e^-0.93038 (1 + 6.7127^5.31 / 4.93e7) = 36.266; ISI in calm
+    # 0.208 * 36.266 = 7.5434, at 18 km/h times e^0.90702 = 2.47693: 18.6846. C-7, b 0.0305, c 2:
+    # [(1 - e^-0.569881) / (1 - e^-0.230074)]^2 = (0.434408 / 0.205525)^2 = 4.4676.
+    assert head_factor(torch.tensor([0.0, 5.0]), "C-7", 94.0).tolist() == pytest.approx([1.0, 4.4676], rel=1e-3)
+
+
+def test_between_two_directions_a_wind_keeps_its_head() -> None:
+    # The same wind of 8 m/s at 22.5 degrees: each of the two directions beside it has the half of the peak and more,
+    # where the ellipse itself loses nine tenths.
+    along = fbp(a_wind(8.0, 0.0), "C-7", 94.0).max()
+    angle = math.pi / 8
+    between = fbp(a_wind(8.0 * math.cos(angle), 8.0 * math.sin(angle)), "C-7", 94.0)[0, :, 0, 0]
+    assert (between[[EAST, NORTH_EAST]] / along).tolist() == pytest.approx([0.54, 0.54], abs=0.05)
+
+
 def test_the_factors_of_alexandridis_by_hand() -> None:
     # 10 m/s to the east: head exp(0.45) = 1.568312; 45 degrees exp(0.45 - 1.31 * 0.292893) = 1.068560.
     factor = alexandridis(a_wind(10.0, 0.0), 0.045, 0.131)[0, :, 0, 0]
@@ -43,13 +74,13 @@ def test_the_factors_of_alexandridis_by_hand() -> None:
     assert factor[NORTH_EAST].item() == pytest.approx(1.068560, rel=1e-5)
 
 
-@pytest.mark.parametrize("kernel", [lambda wind: alexandridis(wind, 0.045, 0.131), lambda wind: ellipse(wind, 0.16)])
+@pytest.mark.parametrize("kernel", KERNELS, ids=["alexandridis", "ellipse", "fbp"])
 def test_the_head_s_factor_does_not_fall_with_the_wind(kernel) -> None:
     wind = torch.stack((torch.arange(0.0, 60.5, 0.5), torch.zeros(121)), dim=1)[..., None, None]
     assert (kernel(wind)[:, EAST].flatten().diff() > 0.0).all()
 
 
-@pytest.mark.parametrize("kernel", [lambda wind: alexandridis(wind, 0.045, 0.131), lambda wind: ellipse(wind, 0.16)])
+@pytest.mark.parametrize("kernel", KERNELS, ids=["alexandridis", "ellipse", "fbp"])
 def test_factors_turn_with_the_wind_and_do_not_depend_on_the_batch(kernel) -> None:
     angle = torch.arange(64) * (math.pi / 4)
     wind = 7.0 * torch.stack((angle.cos(), angle.sin()), dim=1)[..., None, None]

@@ -10,9 +10,10 @@ from warp_torchrl.system.modes import kept
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.geometry import DISTANCES
+from warp_torchrl.world.behaviour.fbp_fuels import FUEL_TYPES
 from warp_torchrl.world.law import law
 from warp_torchrl.world.law.automaton import Automaton, Beside, at_cells, of_codes
-from warp_torchrl.world.law.wind_and_slope import alexandridis, ellipse, slope_factor
+from warp_torchrl.world.law.wind_and_slope import alexandridis, ellipse, fbp, slope_factor
 from warp_torchrl.world.state.state import Air, Ground, Landscape, WorldState
 
 
@@ -43,10 +44,12 @@ class Fire(Automaton):
 
     Attributes:
         alpha: Flammability of lake, wetland, grassland, forest and bare ground.
-        kernel: The wind's factor: ``alexandridis`` or ``ellipse``.
+        kernel: The wind's factor: ``alexandridis``, ``ellipse`` or ``fbp``.
         wind_gain: c1 of ``alexandridis`` [s/m].
         wind_focus: c2 of ``alexandridis`` [s/m].
         head_gain: g of ``ellipse`` [s/m].
+        head_fuel: Fuel type of the Canadian system whose heads ``fbp`` has.
+        ffmc: Fine fuel moisture code of ``fbp``.
         slope_gain: a [1/degree].
         neighbours: 8 (Moore), or 4 (von Neumann) without the diagonal ones.
         diagonal: ``distance`` divides by the distance to the neighbour, ``unit`` treats all alike.
@@ -57,10 +60,12 @@ class Fire(Automaton):
     """
 
     alpha: tuple[float, float, float, float, float] = (0.0, 0.1, 1.0, 0.8, 0.0)
-    kernel: Literal["alexandridis", "ellipse"] = "alexandridis"
+    kernel: Literal["alexandridis", "ellipse", "fbp"] = "alexandridis"
     wind_gain: float = 0.045
     wind_focus: float = 0.131
     head_gain: float = 0.16
+    head_fuel: str = "C-7"
+    ffmc: float = 94.0
     slope_gain: float = 0.078
     neighbours: Literal[4, 8] = 8
     diagonal: Literal["distance", "unit"] = "distance"
@@ -73,9 +78,13 @@ class Fire(Automaton):
             wind_gain=(0.0, 1.0),
             wind_focus=(0.0, 1.0),
             head_gain=(0.0, 1.0),
+            ffmc=(50.0, 101.0),
             slope_gain=(0.0, 1.0),
             wet_ticks=(0, 255),
         )
+        if self.head_fuel not in FUEL_TYPES:
+            known = ", ".join(FUEL_TYPES)
+            raise ValueError(f"head_fuel must be one of {known}, got {self.head_fuel!r}")
         if len(self.alpha) != 5 or not all(0.0 <= value <= 1.0 for value in self.alpha):
             raise ValueError(f"alpha must be five numbers in [0, 1], one a cover, got {list(self.alpha)}")
 
@@ -102,6 +111,8 @@ class Fire(Automaton):
         """Return the wind's factor, float32 [B, 8, h, w], of a wind [B, 2, h, w] [m/s] at the burning cell."""
         if self.kernel == "ellipse":
             return ellipse(wind, self.head_gain)
+        if self.kernel == "fbp":
+            return fbp(wind, self.head_fuel, self.ffmc)
         return alexandridis(wind, self.wind_gain, self.wind_focus)
 
     def gain(self, wind: Tensor) -> Tensor:

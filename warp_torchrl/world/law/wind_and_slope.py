@@ -12,8 +12,13 @@ from torch.nn.functional import pad
 
 from warp_torchrl.system.modes import kept
 from warp_torchrl.world.arrays.geometry import DIRECTIONS, DISTANCES, unit_vectors
+from warp_torchrl.world.behaviour.fbp import fine_fuel_effect, spread_index
+from warp_torchrl.world.behaviour.fbp_fuels import FUEL_TYPES
 
 _KM_PER_HOUR = 3.6  # of one m/s; the Canadian system's winds are in km/h
+_ALONE = 3.2
+"""How much a narrow head lacks, which leaps by one neighbour where a calm front has several that help."""
+_HALF_SECTOR = math.pi / 8.0
 
 
 def alexandridis(wind: Tensor, gain: float, focus: float) -> Tensor:
@@ -53,6 +58,85 @@ def ellipse(wind: Tensor, head_gain: float) -> Tensor:
     cosine = along / speed.clamp(min=1e-9)
     shape = torch.log1p(-eccentricity) - torch.log1p(-eccentricity * cosine)
     return _bounded_exp(1.67 * (head_gain * speed + shape))
+
+
+def fbp(wind: Tensor, fuel: str, ffmc: float) -> Tensor:
+    """Return the wind's factor whose heads and shapes are those of the Canadian system, at any angle to the grid.
+
+        w_d = H(V) (1 + 3.2 x) [(1 - x) S_1(theta_d) + x S_2(theta_d)],   x = 1 - 1 / LB(V)
+
+    S_p is the mean of the p-th power of an ellipse's speed, 1 / (1 - e cos theta), over the 45 degrees for which a
+    direction stands, over that of a direction straight downwind. A mean over 45 degrees keeps the head of a wind that
+    blows between two directions, which the speeds in the directions themselves lose. The power grows with x and the
+    head with 3.2 x as a fire that leaps from cell to cell by chance needs it; both were measured on such fires, and
+    are ours.
+
+    Args:
+        wind: (u, v) at the source, float32 [B, 2, h, w] [m/s].
+        fuel: Fuel type of the Canadian system, for the head: see ``head_factor``.
+        ffmc: Fine fuel moisture code.
+
+    Returns:
+        float32 [B, 8, h, w]; exactly 1 without wind.
+    """
+    speed = torch.sqrt(wind[:, :1].square() + wind[:, 1:].square())
+    ratio = length_to_breadth(speed)
+    narrow = 1.0 - ratio.reciprocal()
+    eccentricity = torch.sqrt(1.0 - ratio.square().reciprocal())
+    east, north = _edges(wind.device)
+    u, v = (part / speed.clamp(min=1e-9) for part in (wind[:, :1], wind[:, 1:]))
+    cosine = u * east[:, None, None] + v * north[:, None, None]
+    sine = u * north[:, None, None] - v * east[:, None, None]
+    tangent = torch.where(cosine < 0.0, (1.0 - cosine) / sine, sine / (1.0 + cosine))  # of half the angle
+    left = _integrals(cosine, sine, tangent, eccentricity)
+    head = _integrals(*(math.cos(_HALF_SECTOR), math.sin(_HALF_SECTOR), math.tan(_HALF_SECTOR / 2.0)), eccentricity)
+    first, second = (
+        _between(edge, whole) / (2.0 * half) for edge, half, whole in zip(left, head, _whole(eccentricity), strict=True)
+    )
+    factor = head_factor(speed, fuel, ffmc) * (1.0 + _ALONE * narrow) * torch.lerp(first, second, eccentricity.square())
+    return torch.where(speed > 0.0, factor, 1.0)
+
+
+def head_factor(speed: Tensor, fuel: str, ffmc: float) -> Tensor:
+    """Return how much faster than in calm air a fire's head is, float32, shape of ``speed`` [m/s]; 1 without wind.
+
+        H = [(1 - exp(-b I(V))) / (1 - exp(-b I(0)))]^c      (Canadian FBP System, Forestry Canada 1992, eq. 26)
+
+    I is the initial spread index of the wind and of the fine fuel moisture code (eqs. 45, 46, 52, 53, 53a).
+
+    Args:
+        speed: Of the wind [m/s].
+        fuel: Fuel type, a key of ``behaviour.fbp_fuels.FUEL_TYPES``.
+        ffmc: Fine fuel moisture code, 0..101.
+    """
+    kind, fine = FUEL_TYPES[fuel], fine_fuel_effect(torch.tensor(float(ffmc), device=speed.device))
+    now, calm = (
+        torch.log(-torch.expm1(-kind.b * spread_index(fine, _KM_PER_HOUR * each)))
+        for each in (speed, torch.zeros_like(speed))
+    )
+    return torch.exp(kind.c * (now - calm))
+
+
+def _integrals(
+    cosine: Tensor | float, sine: Tensor | float, tangent: Tensor | float, eccentricity: Tensor
+) -> tuple[Tensor, Tensor]:
+    """Return the integrals of 1 / (1 - e cos t) and of its square from 0 to an angle, in (-pi, pi]."""
+    minor = 1.0 - eccentricity.square()
+    first = 2.0 / torch.sqrt(minor) * torch.atan(torch.sqrt((1.0 + eccentricity) / (1.0 - eccentricity)) * tangent)
+    return first, (eccentricity * sine / (1.0 - eccentricity * cosine) + first) / minor
+
+
+def _whole(eccentricity: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the integrals over the whole circle."""
+    minor = 1.0 - eccentricity.square()
+    first = 2.0 * math.pi / torch.sqrt(minor)
+    return first, first / minor
+
+
+def _between(left: Tensor, whole: Tensor) -> Tensor:
+    """Return the integral over each direction's sector, of those to its left edge; the angle may pass pi within it."""
+    part = left - left.roll(-1, 1)  # a direction's right edge is the next one's left edge
+    return torch.where(part < 0.0, part + whole, part)
 
 
 def length_to_breadth(speed: Tensor) -> Tensor:
@@ -106,3 +190,10 @@ def _bounded_exp(exponent: Tensor) -> Tensor:
 def _directions(device: torch.device) -> tuple[Tensor, Tensor]:
     vectors = unit_vectors(device)
     return vectors[:, 0].contiguous(), vectors[:, 1].contiguous()
+
+
+@kept(8)
+def _edges(device: torch.device) -> tuple[Tensor, Tensor]:
+    """Return east and north of the left edge of each direction's sector, counter-clockwise of it, float32 [8]."""
+    angle = [math.pi / 2.0 - direction * 2.0 * _HALF_SECTOR + _HALF_SECTOR for direction in range(8)]
+    return tuple(torch.tensor([part(each) for each in angle], device=device) for part in (math.cos, math.sin))  # type: ignore[return-value]
