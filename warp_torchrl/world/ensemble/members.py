@@ -124,6 +124,14 @@ def in_parameters(worlds: WorldState, fire: Automaton, parameters: Tensor | None
     return worlds.replace(ground=ground, air=backend.air(fire, wind, worlds.air.moisture, ground))
 
 
+def as_known(worlds: WorldState, fire: Automaton, imagined: Automaton) -> Tensor | None:
+    """Return the parameters, see ``in_parameters``, of worlds in the wind and at the rate that are known.
+
+    None where fires are imagined by the law of the true ones: then nothing of it need be made anew.
+    """
+    return None if imagined is fire else torch.zeros(len(worlds.key), 3, device=worlds.key.device)
+
+
 def in_other_air(wind: Tensor, parameters: Tensor | None) -> Tensor:
     """Return a wind [n, 2, h, w] of another speed and bearing, see ``in_parameters``."""
     if parameters is None:

@@ -109,3 +109,34 @@ def test_what_a_law_draws_of_the_ground_has_the_factor_of_the_rate_once():
     pace = "extras.belief.members.ground.terms.pace"
     assert torch.equal(played(world, state, 4).leaves()[pace], state.leaves()[pace])
     assert not torch.equal(state.leaves()[pace][:, 0], state.leaves()[pace][:, 1]), "each member's are drawn"
+
+
+def test_a_law_by_its_own_name_is_no_other_law():
+    # What is made anew of the same law is the same to the bit, with what is known of wind and rate and without.
+    for options in ({}, {"rate_deviation": 0.4, "wind_speed_deviation": 0.3, "particles": 16}):
+        same, named = (
+            rules(belief=Ensemble(members=4, hidden=8, kernel=kernel, **options)) for kernel in (None, "alexandridis")
+        )
+        ours, theirs = (
+            played(world, begun(world, alight(world, reset(world), (5, 3)), *AT), 6) for world in (same, named)
+        )
+        own = believed(theirs)
+        assert not [name for name, leaf in believed(ours).items() if not torch.equal(leaf, own[name])]
+
+
+@pytest.mark.parametrize("law", ["paper", "hazard"])
+def test_a_team_that_is_wrong_of_the_law_imagines_other_fires_in_the_same_world(law):
+    right, wrong = (rules(law, belief=Ensemble(members=4, hidden=8, kernel=kernel)) for kernel in (None, "ellipse"))
+    ours, theirs = (
+        played(world, begun(world, alight(world, reset(world), (5, 3)), *AT), 8) for world in (right, wrong)
+    )
+    assert not {*differing(ours.without_planes("belief"), theirs.without_planes("belief"))}, "the world is the same"
+    assert not torch.equal(cells_of(beliefs_of(ours)), cells_of(beliefs_of(theirs)))
+    assert not torch.equal(beliefs_of(ours).soon, beliefs_of(theirs).soon)
+    assumed = [world.assumed(state) for world, state in ((right, ours), (wrong, theirs))]
+    assert not torch.equal(*(state.air.terms.gain for state in assumed)), "baselines reckon with the imagined law"
+
+
+def test_a_law_without_a_kernel_is_refused():
+    with pytest.raises(ValueError, match=r"belief\.kernel must be null under a law without one, got fbp"):
+        rules("rate", belief=Ensemble(kernel="fbp"))

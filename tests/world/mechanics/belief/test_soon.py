@@ -35,4 +35,4 @@ def test_it_is_of_the_last_tick_and_in_worlds_that_tick_alone():
     after = world.step(mixed, stay(mixed)).after
     now = beliefs_of(after).soon
     assert now[0].eq(now.new_tensor(0.3)).all()
-    assert torch.equal(now[1:], burns_within(after[1:], world, 2)) and now[1].amax() == 1.0
+    assert torch.equal(now[1:], burns_within(after[1:], world, world.fire, 2)) and now[1].amax() == 1.0

@@ -14,7 +14,7 @@ from warp_torchrl.world.state.state import Action
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 
-LAWS = {"paper": Fire(), "hazard": HazardFire(), "rate": RateFire()}
+LAWS = {"paper": Fire(), "hazard": HazardFire(refinement=2), "rate": RateFire()}
 BELIEVES = ("scenario=search", "belief=ensemble", "belief.members=3", "belief.hidden=6", "belief.rate_deviation=0.3")
 WORLDS = {"believes": BELIEVES} if is_there("radio", "sensing") else {}
 

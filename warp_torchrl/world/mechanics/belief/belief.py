@@ -5,7 +5,7 @@ seen, where it is seen (nudging; Mandel et al. 2008 for fires). A fire that was 
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import torch
@@ -17,7 +17,16 @@ from warp_torchrl.world.arrays.batch import Named
 from warp_torchrl.world.arrays.random import imagined_keys, named_key
 from warp_torchrl.world.backends.backend import forecast
 from warp_torchrl.world.ensemble.filtering import moments, resampled
-from warp_torchrl.world.ensemble.members import held, in_parameters, rows_of, ticked, unburned, worlds_of
+from warp_torchrl.world.ensemble.members import (
+    as_known,
+    held,
+    in_parameters,
+    rows_of,
+    ticked,
+    unburned,
+    worlds_of,
+)
+from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.mechanics.belief.beliefs import (
     NAME,
     Beliefs,
@@ -85,6 +94,8 @@ class Ensemble(Belief, Mechanic):
         rate_deviation: Coefficient of variation of the rate of spread, as far as the team knows; 0: it knows it.
         wind_speed_deviation: The same of the wind's speed.
         bearing_deviation: Standard deviation of the wind's bearing, as far as the team knows [degrees].
+        kernel: The wind's factor by which fires are imagined, ``fire.kernel``; None: that of the true ones. A stress
+            test: another one than theirs is a team that is wrong of the law.
         soon: Ticks of the fire within which ``burn_soon`` shows what may burn.
 
     Raises:
@@ -111,6 +122,7 @@ class Ensemble(Belief, Mechanic):
     rate_deviation: float = 0.0
     wind_speed_deviation: float = 0.0
     bearing_deviation: float = 0.0
+    kernel: Literal["alexandridis", "ellipse", "fbp"] | None = None
     soon: int = 2
 
     def __post_init__(self) -> None:
@@ -127,6 +139,10 @@ class Ensemble(Belief, Mechanic):
             bearing_deviation=(0.0, 180.0),
             soon=(1, 64),
         )
+
+    def law(self, fire: Automaton) -> Automaton:
+        """Return the law by which fires are imagined."""
+        return fire if self.kernel is None else replace(fire, kernel=self.kernel)  # type: ignore[call-arg]
 
     def trusts(self, world: Rules) -> float:
         """Return what each cell that is seen counts for in the members' weights; 0 where they stay alike."""
@@ -147,6 +163,8 @@ class Ensemble(Belief, Mechanic):
         """
         if not world.sensing.is_limited:
             raise ValueError("belief must be none where agents see all (sensing=full)")
+        if self.kernel is not None and not hasattr(world.fire, "kernel"):
+            raise ValueError(f"belief.kernel must be null under a law without one, got {self.kernel}")
         if self.of == "team" and not (world.hearing.sends_maps and world.hearing.is_everywhere):
             raise ValueError(
                 "belief.of must be agent where the team does not share its maps everywhere at once "
@@ -181,25 +199,25 @@ class Ensemble(Belief, Mechanic):
         )
         state = state.with_planes(NAME, beliefs)
         always = torch.ones_like(state.done)
-        return foreseen(
-            self._looked(state, torch.full_like(kept(state), _NEVER), always, world), always, world, self.soon
-        )
+        state = self._looked(state, torch.full_like(kept(state), _NEVER), always, world)
+        return foreseen(state, always, world, self.law(world.fire), self.soon)
 
     def step(self, before: WorldState, after: WorldState, running: Tensor, world: Rules) -> WorldState:
         """Return worlds whose beliefs have ticked, and were weighed and corrected by what is seen after the step."""
         now = after.tick > before.tick
         after = self._looked(self._ticked(before, after, world), kept(before), running, world)
-        after = foreseen(after, now, world, self.soon)
+        after = foreseen(after, now, world, self.law(world.fire), self.soon)
         beliefs = beliefs_of(after)
         return after.with_planes(NAME, counted(beliefs, is_burning(after.cells), running, self.threshold))
 
     def assumed(self, state: WorldState, world: Rules) -> WorldState:
         """Return the worlds as they are believed to be, see ``beliefs.most_believed``, in the mean wind and rate."""
         believed, known = most_believed(state, self.threshold), beliefs_of(state).learning
+        fire = self.law(world.fire)
         if known is None:
-            return believed
+            return in_parameters(believed, fire, as_known(believed, world.fire, fire))
         mean, _ = moments(known.particles.flatten(0, 1), known.weights.flatten(0, 1))
-        return in_parameters(believed, world.fire, mean)
+        return in_parameters(believed, fire, mean)
 
     def worth_seeing(self, state: WorldState, world: Rules) -> Tensor:
         """Return the chance of each cell to burn, known and hidden, where smoke comes from that nobody explains, and a
@@ -235,8 +253,10 @@ class Ensemble(Belief, Mechanic):
             return leaf.gather(1, pick.view(*pick.shape, *[1] * (leaf.ndim - 2)).expand(-1, -1, *leaf.shape[2:]))
 
         own = Named({name: picked(leaf) for name, leaf in beliefs.members.held.items()})
-        values = None if beliefs.learning is None else picked(beliefs.learning.members[:, 0]).flatten(0, 1)
-        worlds, rows = in_parameters(worlds_of(state, own, world.fire), world.fire, values), rows_of(state, count)
+        fire, worlds, rows = self.law(world.fire), worlds_of(state, own, world.fire), rows_of(state, count)
+        known = beliefs.learning
+        values = as_known(worlds, world.fire, fire) if known is None else picked(known.members[:, 0]).flatten(0, 1)
+        worlds = in_parameters(worlds, fire, values)
         hidden = [each for each in world.loop if each.is_hidden]
         others = (NAME, KNOWLEDGE, HEARING, *world.fire.keeps, *(each.name for each in hidden))
         for name, planes in state.extras.held.items():
@@ -284,26 +304,28 @@ class Ensemble(Belief, Mechanic):
     def _after_tick(self, before: WorldState, after: WorldState, now: Tensor, world: Rules) -> Beliefs:
         beliefs = self._acted(before, after)
         beliefs = self._learned(before, beliefs, now, world)
-        known, values, lit = beliefs.learning, None, None
-        if known is not None:
-            values, lit = known.members.flatten(0, 2), known.hidden.flatten(0, 1)
-        members = in_parameters(worlds_of(before, beliefs.members, world.fire), world.fire, values)
+        fire, members = self.law(world.fire), worlds_of(before, beliefs.members, world.fire)
+        known = beliefs.learning
+        values = as_known(members, world.fire, fire) if known is None else known.members.flatten(0, 2)
+        members = in_parameters(members, fire, values)
         count, chances = beliefs.members.held["key"].shape[1], beliefs.chances
         rows = rows_of(before, count)
         if self.trusts(world):
-            ignites = forecast(world.fire, members).ignition_probability * now[rows][:, None, None]
+            ignites = forecast(fire, members).ignition_probability * now[rows][:, None, None]
             chances = chances.replace(values=ignites.unflatten(0, (-1, count)))
 
         def grown(own: Named, worlds: WorldState, count: int, parameters: Tensor | None) -> Named:
             rows = rows_of(before, count)
             air = after.air[rows] if world.air.changes else after.air
-            new = held(ticked(worlds, world.fire, world.air, now[rows], air, parameters), count, world.fire)
+            new = held(ticked(worlds, fire, world.air, now[rows], air, parameters), count, fire)
             drawn = (name for name in world.fire.draws if name in own.held)
             return new.replace(**{name: own.held[name] for name in drawn})  # without the factor on their rate
 
         hidden = beliefs.hidden
         if self.hidden:
-            worlds = in_parameters(worlds_of(before, hidden, world.fire), world.fire, lit)
+            worlds = worlds_of(before, hidden, fire)
+            lit = as_known(worlds, world.fire, fire) if known is None else known.hidden.flatten(0, 1)
+            worlds = in_parameters(worlds, fire, lit)
             hidden = grown(hidden, worlds, self.hidden, lit)
         return beliefs.replace(members=grown(beliefs.members, members, count, values), chances=chances, hidden=hidden)
 
@@ -321,7 +343,7 @@ class Ensemble(Belief, Mechanic):
         known = beliefs.learning
         if known is None:
             return beliefs
-        known = learned(before, known, world.fire, world.sensing.errors, now)
+        known = learned(before, known, self.law(world.fire), world.sensing.errors, now)
         cells, wet = (beliefs.members.held[name].unflatten(1, beliefs.weights.shape[1:]) for name in ("cells", "wet"))
         spreads = (cells >= FIRST_FIRE) & (cells <= world.fire.last_spreading)
         fuel = (is_tree(cells) & (cells >= world.fire.youngest_fuel) & (wet == 0)).any(dim=2)
