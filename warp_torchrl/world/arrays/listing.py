@@ -2,8 +2,10 @@
 
 import torch
 from torch import Tensor
+from torch.nn.functional import pad
 
 from warp_torchrl.system.device import needs_no_sync
+from warp_torchrl.world.arrays.compile import is_fused
 
 VECTORS = 64
 """What the length of a list is a multiple of where its numbers must not depend on the batch: some of torch's operations
@@ -40,11 +42,17 @@ def first_cells(mask: Tensor, count: int) -> tuple[Tensor, Tensor]:
 
     Args:
         mask: bool [B, H, W].
-        count: K, how many of each world.
+        count: K, how many of each world at most.
 
     Returns:
-        Flat indices, int64 [B, K], and which of them are marked cells, bool [B, K].
+        Flat indices, int64 [B, K], and which of them are marked cells, bool [B, K]. Where reading needs no
+        synchronisation K is no longer than the marks of any world need, in whole vectors.
     """
+    if needs_no_sync(mask.device) and not is_fused():
+        index, is_there = list_cells(mask)
+        length = min(count, filled(index.shape[1]))
+        more = max(0, length - index.shape[1])
+        return pad(index[:, :length], (0, more)), pad(is_there[:, :length], (0, more))
     marked = mask.flatten(1)
     rank = marked.cumsum(dim=1)
     slot = torch.where(marked & (rank <= count), rank - 1, count)

@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.system.device import needs_no_sync
+from warp_torchrl.world.arrays.batch import Batched
 from warp_torchrl.world.arrays.bytes import number
 from warp_torchrl.world.arrays.compile import is_fused
 from warp_torchrl.world.arrays.random import Stream, uniform
@@ -128,12 +129,10 @@ def _follows_air(name: str) -> bool:
     return name.startswith(("air.", f"extras.{RATE}."))
 
 
-def advance_rows(
-    state: WorldState, ticks_now: Tensor, advance: Callable[[WorldState, Tensor], WorldState]
-) -> WorldState:
+def advance_rows(state: Batched, ticks_now: Tensor, advance: Callable[[Batched, Tensor], Batched]) -> Batched:
     """Return ``advance(state, ticks_now)``, on a CPU computed for the worlds that tick alone.
 
-    Which ones they are is read back from the device.
+    The others stay as they are. Which ones they are is read back from the device.
     """
     if not _may_read(ticks_now.device):
         return advance(state, ticks_now)

@@ -56,22 +56,24 @@ class Load(NamedTuple):
     alike: float  # intensity of all fire under laws without one [kW/m]
 
 
-def fallen(
-    after: WorldState, there: WorldState, dropped: Tensor, target: Tensor, load: Load
-) -> tuple[WorldState, Tensor, Tensor]:
-    """Return worlds after drops, which of them put out a fire, bool [B, A], and the coverage.
+@dataclass(eq=False, repr=False)
+class Drop(Batch):
+    """Loads that fall in worlds."""
 
-    Args:
-        after: The worlds after all other acts.
-        there: The worlds in which the aircraft dropped.
-        dropped: Which agents did, bool [B, A].
-        target: Flat index of the first cell of each, int64 [B, A].
-        load: What falls.
-    """
-    loads, (height, width) = there.planes("drops", Loads), there.cells.shape[1:]
+    state: WorldState  # after all other acts
+    cells: Tensor  # uint8 [B,H,W], the cells before them
+    falls: Tensor  # bool [B,A], which agents drop
+    target: Tensor  # int64 [B,A], flat index of the first cell of each
+    hit: Tensor  # bool [B,A], which have put out a fire
+
+
+def fallen(drop: Drop, load: Load) -> Drop:
+    """Return worlds after loads have fallen, and which of them put out a fire."""
+    after, there = drop.state, drop.state.replace(cells=drop.cells)
+    loads, (height, width) = after.planes("drops", Loads), after.cells.shape[1:]
     count = min(max(1, round(load.length / there.ground.cell_size)), max(height, width))
-    cells, on_map = pattern(target, loads.heading, count, (height, width))
-    cell, falls = cells.flatten(1), (on_map & dropped[..., None]).flatten(1)
+    cells, on_map = pattern(drop.target, loads.heading, count, (height, width))
+    cell, falls = cells.flatten(1), (on_map & drop.falls[..., None]).flatten(1)
     place = there.vehicles.position[:, :, None].expand(-1, -1, count, -1).flatten(1, 2)
     front = front_towards(there, loads.heat, load.alike, cell, place)
     most = held_intensity(torch.full_like(front, load.level), at_cells(loads.fuel, cell), load)
@@ -82,7 +84,8 @@ def fallen(
     becomes: dict[str, Tensor | int] = {"cells": at_cells(after.age, cell), "age": 0, "extinguished": 1, "wet": wet}
     after = changed(after, cell, [(out, becomes), (stands, {"wet": wet})])
     coverage = loads.coverage.flatten(1).scatter_reduce(1, cell, load.level * falls, "amax").view_as(loads.coverage)
-    return after, out.view_as(cells).any(dim=-1), coverage
+    after = after.with_planes("drops", loads.replace(coverage=coverage))
+    return drop.replace(state=after, hit=out.view_as(cells).any(dim=-1))
 
 
 def held(state: WorldState, ticks_now: Tensor, load: Load) -> WorldState:
