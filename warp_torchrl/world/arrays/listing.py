@@ -25,8 +25,8 @@ def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
     marked = mask.flatten(1)
     if not needs_no_sync(mask.device):
         return torch.arange(marked.shape[1], device=mask.device).expand_as(marked), marked
-    counts = marked.sum(dim=1)
     world, cell = marked.nonzero().unbind(dim=1)
+    counts = torch.bincount(world, minlength=len(marked))  # a sum of bools reads the map again, and slowly
     index = marked.new_zeros(len(marked), max(int(counts.max()), 1), dtype=torch.int64)
     index[world, torch.arange(len(world), device=mask.device) - (counts.cumsum(0) - counts)[world]] = cell
     return index, torch.arange(index.shape[1], device=mask.device) < counts[:, None]

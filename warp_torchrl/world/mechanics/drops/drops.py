@@ -13,7 +13,8 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.blocks import block_means
-from warp_torchrl.world.backends.backend import advance_rows
+from warp_torchrl.world.arrays.bytes import above
+from warp_torchrl.world.backends.backend import advance_any, advance_rows
 from warp_torchrl.world.behaviour.firebreaks import intensity_of
 from warp_torchrl.world.law.anderson import anderson_numbers
 from warp_torchrl.world.law.automaton import at_cells
@@ -133,6 +134,7 @@ class Drops(Mechanic):
             aircraft=aircraft.expand(vehicles.tank.shape).contiguous(),
             heading=torch.zeros_like(vehicles.last_action),
             waits=torch.zeros_like(vehicles.tank),
+            smoke=self._smoke(state),
             drops=torch.zeros_like(state.step),
             hits=torch.zeros_like(state.step),
             minutes=minutes,
@@ -143,9 +145,8 @@ class Drops(Mechanic):
 
     def masked(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return which actions are open, bool [B, A, actions]: no drop at night, in smoke, or while aircraft load."""
-        drop = int(Action.EXTINGUISH)
-        able = mask[..., drop] & may_drop(state, self._limits)
-        after = torch.cat((mask[..., :drop], able[..., None], mask[..., drop + 1 :]), dim=-1)
+        after = mask.clone()
+        after[..., int(Action.EXTINGUISH)] &= may_drop(state, self._limits)
         return torch.where(after.any(dim=-1, keepdim=True), after, mask)
 
     def grounded(self, state: WorldState, roles: RoleTable) -> Tensor | None:
@@ -165,7 +166,7 @@ class Drops(Mechanic):
         held = attempts._replace(acts=attempts.acts & ~ours, takes_water=attempts.takes_water & (falls | ~tries))
         after, result = take_effect(state, held)
         drop = Drop(after, state.cells, falls, attempts.target, torch.zeros_like(falls))
-        fell = advance_rows(drop, falls.any(dim=1), lambda rows, _: fallen(rows, self._load))
+        fell = advance_any(drop, falls, lambda whole: fallen(whole, self._load))
         after, hit = fell.state, fell.hit
         left = state.vehicles.tank - held.takes_water.to(torch.int32)
         tank, waits = loading(after, left, running, self.agent == "retardant")
@@ -204,7 +205,7 @@ class Drops(Mechanic):
         """
         loads, own = state.planes(self.name, Loads), own_cell(state)
         loaded = 1.0 - loads.waits / max(loads.turnaround, 1)
-        smoke = torch.zeros_like(loaded) if self.smoke is None else smoke_at(state, self.smoke_length)
+        smoke = torch.zeros_like(loaded) if loads.smoke is None else loads.smoke
         left = daylight_left(state, self._limits)[:, None].expand_as(loaded) / 12.0
         covered = at_cells(loads.coverage, own) / self.level
         limit = max(self.smoke or 0.0, 0.1)
@@ -216,7 +217,7 @@ class Drops(Mechanic):
 
     def picture(self, state: WorldState, side: int) -> Tensor:
         """Return the share of each block that drops cover, float32 [B, A, 1, side, side]."""
-        share = block_means(state.planes(self.name, Loads).coverage > LEAST, side)
+        share = block_means(above(state.planes(self.name, Loads).coverage, LEAST), side)
         return share[:, None, None].expand(-1, state.vehicles.tank.shape[1], -1, -1, -1)
 
     @property
@@ -225,13 +226,20 @@ class Drops(Mechanic):
         area = self.litres / (LITRES_PER_LEVEL * self.level)
         return Load(area / self.width, self.level, self.holds, self.most, half_life, intensity_of(self.flame_length))
 
+    def step(self, before: WorldState, after: WorldState, running: Tensor, world: Rules) -> WorldState:
+        """Return worlds after a step, with the smoke that is over the agents now."""
+        return after.with_planes(self.name, after.planes(self.name, Loads).replace(smoke=self._smoke(after)))
+
     def _held(self, state: WorldState, ticks_now: Tensor) -> WorldState:
-        is_covered = (state.planes(self.name, Loads).coverage > 0.0).flatten(1).any(dim=1)
+        is_covered = state.planes(self.name, Loads).coverage.flatten(1).amax(dim=1) > 0.0
         return advance_rows(state, ticks_now & is_covered, lambda rows, ticks: held(rows, ticks, self._load))
+
+    def _smoke(self, state: WorldState) -> Tensor | None:
+        return None if self.smoke is None else smoke_at(state, self.smoke_length)
 
     @property
     def _limits(self) -> Limits:
-        return Limits(self.begins, self.daylight, self.smoke, self.smoke_length)
+        return Limits(self.begins, self.daylight, self.smoke)
 
 
 def _drops(role: str) -> bool:

@@ -5,12 +5,14 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor
+from torch.nn.functional import threshold
 
 from warp_torchrl.world.arrays.batch import Batch
-from warp_torchrl.world.arrays.blocks import sums_about
+from warp_torchrl.world.arrays.bytes import above
 from warp_torchrl.world.arrays.constants import whole_numbers
-from warp_torchrl.world.arrays.geometry import offsets
+from warp_torchrl.world.arrays.geometry import grow, offsets
 from warp_torchrl.world.arrays.listing import first_cells
+from warp_torchrl.world.arrays.squares import clamped
 from warp_torchrl.world.behaviour.firebreaks import intensity_of
 from warp_torchrl.world.law.automaton import at_cells
 from warp_torchrl.world.law.flames import front_towards, strongest_into
@@ -38,6 +40,7 @@ class Loads(Batch):
     aircraft: Tensor  # bool [B,A], drops what it carries
     heading: Tensor  # int64 [B,A], direction of the last move, north before the first
     waits: Tensor  # int32 [B,A], steps until it has loaded
+    smoke: Tensor | None  # float32 [B,A], over each agent; None where no smoke is too much
     drops: Tensor  # int32 [B], so far
     hits: Tensor  # int32 [B], of which put out a fire
     minutes: float  # of a tick
@@ -54,6 +57,11 @@ class Load(NamedTuple):
     most: float  # flames over which none holds [m]
     half_life: float  # of the level [minutes]
     alike: float  # intensity of all fire under laws without one [kW/m]
+
+    @property
+    def least(self) -> float:
+        """Return the intensity of the strongest fronts that its level holds in any fuel [kW/m]."""
+        return min(intensity_of(self.holds) * self.level / max(_NEEDED), intensity_of(self.most))
 
 
 @dataclass(eq=False, repr=False)
@@ -74,13 +82,17 @@ def fallen(drop: Drop, load: Load) -> Drop:
     count = min(max(1, round(load.length / there.ground.cell_size)), max(height, width))
     cells, on_map = pattern(drop.target, loads.heading, count, (height, width))
     cell, falls = cells.flatten(1), (on_map & drop.falls[..., None]).flatten(1)
-    place = there.vehicles.position[:, :, None].expand(-1, -1, count, -1).flatten(1, 2)
-    front = front_towards(there, loads.heat, load.alike, cell, place)
-    most = held_intensity(torch.full_like(front, load.level), at_cells(loads.fuel, cell), load)
     codes, wet = at_cells(after.cells, cell), at_cells(after.wet, cell).clamp(min=1)
-    burns = (codes >= FIRST_FIRE) & (codes <= loads.last_spreading)
-    stands = is_tree(codes) & (strongest_into(after, loads.heat, load.alike, cell) <= most)
-    out, stands = (each & ~is_second(cell, each) for each in (falls & burns & (front <= most), falls & stands))
+    out = falls & (codes >= FIRST_FIRE) & (codes <= loads.last_spreading)
+    stands = falls & is_tree(codes)
+    if loads.heat is not None or load.alike >= load.least:  # else any drop holds all flames
+        place = there.vehicles.position[:, :, None].expand(-1, -1, count, -1).flatten(1, 2)
+        front = front_towards(there, loads.heat, load.alike, cell, place)
+        most = held_intensity(torch.full_like(front, load.level), at_cells(loads.fuel, cell), load)
+        out = out & (front <= most)
+        stands = stands & (strongest_into(after, loads.heat, load.alike, cell) <= most)
+    first = ~is_second(cell, out | stands)  # a cell burns or stands, not both
+    out, stands = out & first, stands & first
     becomes: dict[str, Tensor | int] = {"cells": at_cells(after.age, cell), "age": 0, "extinguished": 1, "wet": wet}
     after = changed(after, cell, [(out, becomes), (stands, {"wet": wet})])
     coverage = loads.coverage.flatten(1).scatter_reduce(1, cell, load.level * falls, "amax").view_as(loads.coverage)
@@ -95,9 +107,8 @@ def held(state: WorldState, ticks_now: Tensor, load: Load) -> WorldState:
     """
     loads, here = state.planes("drops", Loads), ticks_now[:, None, None]
     coverage = loads.coverage * torch.where(here, 0.5 ** (loads.minutes / load.half_life), 1.0)
-    coverage = coverage * (coverage > LEAST)
-    by_fire = sums_about(is_burning(state.cells).to(coverage.dtype)[:, None], 1)[:, 0] > 0.5
-    near = here & (coverage > 0.0) & is_tree(state.cells) & by_fire
+    coverage = threshold(coverage, LEAST, 0.0)
+    near = here & above(coverage, 0.0) & is_tree(state.cells) & grow(is_burning(state.cells))
     cell, is_near = first_cells(near, max(_FEWEST, near[0].numel() // _SHARE))
     front = strongest_into(state, loads.heat, load.alike, cell)
     holds = front <= held_intensity(at_cells(coverage, cell), at_cells(loads.fuel, cell), load)
@@ -117,13 +128,11 @@ def pattern(target: Tensor, heading: Tensor, count: int, size: tuple[int, int]) 
     Returns:
         int64 and bool [B, A, count].
     """
-    height, width = size
     ahead = torch.arange(count, device=target.device)
-    way = offsets(target.device)[heading]
-    row = target.div(width, rounding_mode="floor")[..., None] + way[..., :1] * ahead
-    column = (target % width)[..., None] + way[..., 1:] * ahead
-    on_map = (row >= 0) & (row < height) & (column >= 0) & (column < width)
-    return row.clamp(0, height - 1) * width + column.clamp(0, width - 1), on_map
+    start = torch.stack((target.div(size[1], rounding_mode="floor"), target % size[1]), dim=-1)
+    place, is_on_map = clamped(start[..., None] + offsets(target.device)[heading][..., None] * ahead, size)
+    (row, column), (has_row, has_column) = place.unbind(-2), is_on_map.unbind(-2)
+    return torch.add(column, row, alpha=size[1]), has_row & has_column
 
 
 def held_intensity(level: Tensor, fuel: Tensor, load: Load) -> Tensor:

@@ -6,7 +6,6 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.mechanics.drops.loads import Loads
-from warp_torchrl.world.mechanics.drops.smoke import smoke_at
 from warp_torchrl.world.state.state import WorldState
 
 HOURS = 24.0
@@ -19,15 +18,14 @@ class Limits(NamedTuple):
     begins: float  # hour of the day at which fires start
     daylight: tuple[float, float]  # hours from which and to which they drop
     smoke: float | None  # the most over an aircraft; None: any
-    smoke_length: int  # how far it drifts [cells]
 
 
 def may_drop(state: WorldState, limits: Limits) -> Tensor:
     """Return which agents may act, bool [B, A]: all but aircraft that load, or are in the dark or in smoke."""
     loads = state.planes("drops", Loads)
     may = (loads.waits == 0) & (daylight_left(state, limits) > 0.0)[:, None]
-    if limits.smoke is not None:
-        may = may & (smoke_at(state, limits.smoke_length) <= limits.smoke)
+    if loads.smoke is not None and limits.smoke is not None:
+        may = may & (loads.smoke <= limits.smoke)
     return may | ~loads.aircraft
 
 

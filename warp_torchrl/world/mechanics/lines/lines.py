@@ -138,9 +138,8 @@ class FireLines(Mechanic):
         share = torch.stack(
             (at_fire(state, fire_beside(state)[0], self._pace).share, at_line(state, self._pace).share), dim=-1
         )
-        first, last = int(Action.EXTINGUISH), int(Action.CLEAR) + 1
-        able = mask[..., first:last] & (share > 0)
-        after = torch.cat((mask[..., :first], able, mask[..., last:]), dim=-1)
+        after = mask.clone()
+        after[..., int(Action.EXTINGUISH) : int(Action.CLEAR) + 1] &= share > 0
         return torch.where(after.any(dim=-1, keepdim=True), after, mask)
 
     def around(self, state: WorldState, attempts: Attempts, take_effect: TakeEffect) -> tuple[WorldState, ActionResult]:
