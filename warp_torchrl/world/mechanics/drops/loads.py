@@ -11,7 +11,7 @@ from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.bytes import above
 from warp_torchrl.world.arrays.constants import whole_numbers
 from warp_torchrl.world.arrays.geometry import grow, offsets
-from warp_torchrl.world.arrays.listing import first_cells
+from warp_torchrl.world.arrays.shortlist import first_cells
 from warp_torchrl.world.arrays.squares import clamped
 from warp_torchrl.world.behaviour.firebreaks import intensity_of
 from warp_torchrl.world.law.automaton import at_cells

@@ -2,7 +2,6 @@
 
 import torch
 from torch import Tensor
-from torch.nn.functional import max_pool2d
 
 from warp_torchrl.world.arrays.constants import numbers
 
@@ -37,4 +36,11 @@ def longest_about(flames: Tensor, cells: int) -> Tensor:
         flames: Flame lengths, float32 [B, H, W] [m].
         cells: The distance.
     """
-    return flames if cells == 0 else max_pool2d(flames[:, None], 2 * cells + 1, stride=1, padding=cells)[:, 0]
+    for _ in range(cells):  # on CPUs several times faster than pooling
+        rows = flames.clone()
+        torch.maximum(rows[:, 1:], flames[:, :-1], out=rows[:, 1:])
+        torch.maximum(rows[:, :-1], flames[:, 1:], out=rows[:, :-1])
+        flames = rows.clone()
+        torch.maximum(flames[..., 1:], rows[..., :-1], out=flames[..., 1:])
+        torch.maximum(flames[..., :-1], rows[..., 1:], out=flames[..., :-1])
+    return flames
