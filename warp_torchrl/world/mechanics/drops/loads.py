@@ -22,8 +22,10 @@ from warp_torchrl.world.team.acting import changed, is_second
 
 LITRES_PER_LEVEL = 0.40746
 """Litres to a square metre in a coverage level of 1, a US gallon to 100 square feet."""
-_NEEDED = (1, 1, 2, 2, 8, 3, 6, 6, 2, 2, 4, 3, 8, 8)
-"""Coverage level by Anderson's number, 0 first; 8 where the source says more than 6."""
+_NEEDED = (1, 1, 2, 3, 8, 3, 6, 6, 2, 2, 4, 3, 8, 8)
+"""Coverage level by Anderson's number, 0 first: 1, 2, 3, 5 and 8 to 11 by table 1 of the airtanker drop guides of the
+US Forest Service. Those of 4, 6, 7, 12 and 13 are ours: 6 for tall brush, 8 for heavy fuels, which need more than 6
+(NWCG, glossary)."""
 _SHARE, _FEWEST = 256, 16
 """One in so many cells of a map is covered and beside fire in a tick at most, or as many as that on a small one."""
 LEAST = 0.05
@@ -140,8 +142,8 @@ def held_intensity(level: Tensor, fuel: Tensor, load: Load) -> Tensor:
 
         I = I(L) c / n,    at most I(L_most)
 
-    n is the level that the fuel needs (NWCG, Incident Response Pocket Guide, PMS 461; George 1981); I(L) is Byram's
-    intensity of flames of length L. That it goes with the water on an area is ours.
+    n is the level that the fuel needs, see ``_NEEDED``; I(L) is Byram's intensity of flames
+    of length L. That it goes with the water on an area is ours.
 
     Args:
         level: c.
