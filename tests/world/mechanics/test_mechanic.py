@@ -1,17 +1,21 @@
 """What any mechanic may do to the worlds, by one that does a little of each."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import pytest
 import torch
 from torch import Tensor
 
 from tests.conftest import small_world
+from tests.world.drawing import drawn
+from tests.world.mechanics.drawing import begun
 from warp_torchrl.world.arrays.batch import Batch, Named, concatenated
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.mechanics.mechanic import Mechanic
 from warp_torchrl.world.mechanics.table import mechanic, mechanics
 from warp_torchrl.world.state.saved import filled
+from warp_torchrl.world.state.state import Action
 from warp_torchrl.world.team.team import Team
 
 
@@ -106,3 +110,42 @@ def test_the_table_holds_what_the_folders_and_users_add(monkeypatch):
     assert Counting.name == "counting" and mechanics()["counting"] is Counting
     with pytest.raises(ValueError, match="taken must be a new mechanic's name"):
         mechanic("taken")(Counting)
+
+
+class Holding(Mechanic):
+    """Holds back the act of the first agent, and finds that of the last useful."""
+
+    name = "holding"
+
+    def around(self, state, attempts, take_effect):
+        first, last = torch.tensor([[True, False, False]]), torch.tensor([[False, False, True]])
+        acts, water = attempts.acts & ~first, attempts.takes_water & ~first
+        return take_effect(state, attempts._replace(acts=acts, takes_water=water, is_useful=last))
+
+
+class After(Mechanic):
+    """Tells who is left to act, once a mechanic of a later name has held acts back, and lets them."""
+
+    name = "after"
+    seen: ClassVar[list[Tensor]] = []
+
+    def around(self, state, attempts, take_effect):
+        self.seen[:] = [attempts.acts, attempts.target, attempts.origin, state.cells]
+        return take_effect(state, attempts)
+
+
+@pytest.mark.parametrize("rules", [(), (After(), Holding())])
+def test_an_act_that_a_mechanic_holds_back_does_not_happen(rules):
+    extinguish, east = int(Action.EXTINGUISH), int(Action.EAST)
+    world = small_world(mechanics=rules, team=Team(n_agents=3, tank=3), steps_per_tick=9)
+    state = begun(world, (1, 0), (1, 2), (3, 0), drawing="TTT TaT TTT TTT")
+    result, after = (made := world.step(state, torch.tensor([[extinguish, extinguish, east]]))).result, made.after
+    assert drawn(after) == "TTT TTT TTT TTT" and result.moved.tolist() == [[False, False, True]]
+    assert result.credited.tolist() == [[not rules, bool(rules), False]]
+    assert result.redundant.tolist() == [[False, not rules, False]]
+    assert after.vehicles.tank.tolist() == [[3 if rules else 2, 2, 3]] and after.vehicles.acts.tolist() == [[1, 1, 0]]
+    assert after.vehicles.last_useful.tolist() == ([[-1, 0, 0]] if rules else [[0, -1, -1]])
+    if rules:
+        acts, target, origin, cells = After.seen
+        assert acts.tolist() == [[False, True, False]] and target[0, 1] == 4 and cells[0, 1, 1] > 10
+        assert origin.tolist() == [[[1, 0], [1, 2], [3, 0]]]

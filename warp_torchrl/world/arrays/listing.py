@@ -23,8 +23,8 @@ def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
     marked = mask.flatten(1)
     if not needs_no_sync(mask.device):
         return torch.arange(marked.shape[1], device=mask.device).expand_as(marked), marked
-    counts = marked.sum(dim=1)
     world, cell = marked.nonzero().unbind(dim=1)
+    counts = torch.bincount(world, minlength=len(marked))  # a sum of bools reads the map again, and slowly
     index = marked.new_zeros(len(marked), max(int(counts.max()), 1), dtype=torch.int64)
     index[world, torch.arange(len(world), device=mask.device) - (counts.cumsum(0) - counts)[world]] = cell
     return index, torch.arange(index.shape[1], device=mask.device) < counts[:, None]
@@ -33,21 +33,3 @@ def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
 def filled(count: int) -> int:
     """Return the least number of cells that fill vectors, ``count`` or more and 64 at least."""
     return max(1, -(-count // VECTORS)) * VECTORS
-
-
-def first_cells(mask: Tensor, count: int) -> tuple[Tensor, Tensor]:
-    """Return the first marked cells of each world in row-major order, on any device without a synchronisation.
-
-    Args:
-        mask: bool [B, H, W].
-        count: K, how many of each world.
-
-    Returns:
-        Flat indices, int64 [B, K], and which of them are marked cells, bool [B, K].
-    """
-    marked = mask.flatten(1)
-    rank = marked.cumsum(dim=1)
-    slot = torch.where(marked & (rank <= count), rank - 1, count)
-    cell = torch.arange(marked.shape[1], device=mask.device).expand_as(slot)
-    index = torch.zeros(len(marked), count + 1, dtype=torch.int64, device=mask.device).scatter_(1, slot, cell)
-    return index[:, :count], torch.arange(count, device=mask.device) < rank[:, -1:]

@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.system.device import needs_no_sync
+from warp_torchrl.world.arrays.batch import Batched
 from warp_torchrl.world.arrays.bytes import number
 from warp_torchrl.world.arrays.compile import is_fused
 from warp_torchrl.world.arrays.random import Stream, uniform
@@ -128,17 +129,15 @@ def _follows_air(name: str) -> bool:
     return name.startswith(("air.", f"extras.{RATE}."))
 
 
-def advance_rows(
-    state: WorldState, ticks_now: Tensor, advance: Callable[[WorldState, Tensor], WorldState]
-) -> WorldState:
-    """Return ``advance(state, ticks_now)``, on a CPU computed for the worlds that tick alone.
+def advance_rows(state: Batched, ticks_now: Tensor, advance: Callable[[Batched, Tensor], Batched]) -> Batched:
+    """Return ``advance(state, ticks_now)``, on a CPU computed for the worlds that tick alone, if they are the fewer.
 
-    Which ones they are is read back from the device.
+    The others stay as they are. Which ones they are is read back from the device.
     """
     if not _may_read(ticks_now.device):
         return advance(state, ticks_now)
     index = ticks_now.nonzero()[:, 0]
-    if len(index) == len(ticks_now):
+    if 2 * len(index) > len(ticks_now):  # to copy their rows takes longer
         return advance(state, ticks_now)
     if not len(index):
         return state
@@ -146,3 +145,11 @@ def advance_rows(
     before, after, leaves = rows.leaves(), advance(rows, ticks_now[index]).leaves(), state.leaves()
     changed = [name for name, leaf in after.items() if leaf is not before[name]]
     return state.with_leaves({**leaves, **{name: leaves[name].index_copy(0, index, after[name]) for name in changed}})
+
+
+def advance_any(state: Batched, which: Tensor, advance: Callable[[Batched], Batched]) -> Batched:
+    """Return ``advance(state)``, which changes nothing where no mark is set; on a CPU the state itself if none is.
+
+    It is for what costs less in all worlds than to copy those that it changes.
+    """
+    return state if _may_read(which.device) and not which.any() else advance(state)

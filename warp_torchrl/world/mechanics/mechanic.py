@@ -11,7 +11,7 @@ from warp_torchrl.world.ignition.ignition import IgnitionSource
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.state.role import RoleTable
 from warp_torchrl.world.state.state import ActionResult, WorldState
-from warp_torchrl.world.team.acting import Acts
+from warp_torchrl.world.team.acting import Attempts, TakeEffect
 from warp_torchrl.world.team.hearing import Hearing
 from warp_torchrl.world.team.knowledge import Sensing
 from warp_torchrl.world.team.team import Team
@@ -130,15 +130,15 @@ class Mechanic:
         """Return which actions are open, bool [B, A, actions], of those that the agents' abilities allow."""
         return mask
 
-    def around(self, state: WorldState, running: Tensor, acts: Acts) -> tuple[WorldState, ActionResult]:
-        """Return worlds after the agents' moves and acts, and what each action came to.
+    def around(self, state: WorldState, attempts: Attempts, take_effect: TakeEffect) -> tuple[WorldState, ActionResult]:
+        """Return worlds after the agents' acts, and what each action came to; it may hold acts back.
 
         Args:
-            state: The worlds before the step.
-            running: Worlds that have not ended, bool [B].
-            acts: Lets the agents act; what happens before and after it is the mechanic's.
+            state: The worlds after the moves, in which no cell has changed yet.
+            attempts: What the agents are about to do.
+            take_effect: Changes worlds by the attempts that it is given. Those whose ``acts`` are not set do nothing.
         """
-        return acts(state)
+        return take_effect(state, attempts)
 
     def due_at_base(self, state: WorldState, roles: RoleTable) -> Tensor | None:
         """Return which agents must set out for their base now, bool [B, A]; None where none ever has to."""

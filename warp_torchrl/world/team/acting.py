@@ -13,8 +13,24 @@ from warp_torchrl.world.state.role import RoleTable
 from warp_torchrl.world.state.state import ActionResult, WorldState
 from warp_torchrl.world.team.abilities import Ability, AgentContext, Effect
 
-Acts = Callable[[WorldState], tuple[WorldState, ActionResult]]
-"""Lets the agents act: returns the worlds after it, and the result of each action."""
+
+class Attempts(NamedTuple):
+    """What agents are about to do once they have moved, [B, A] each."""
+
+    action: Tensor  # int64, as chosen
+    running: Tensor  # bool [B, 1], worlds that go on; in others nobody does anything
+    origin: Tensor  # int64 [B, A, 2], where each was before the moves (row, column)
+    moved: Tensor  # bool, changed cell
+    acts: Tensor  # bool, changes its target
+    target: Tensor  # int64, flat index of the cell
+    takes_water: Tensor  # bool, empties a tank that is limited by one
+    is_useful: Tensor  # bool, is of use though it changes no cell
+
+
+AgentEffect = tuple[Tensor, Mapping[str, Tensor | int]]
+"""Which agents' acts have an effect, bool [B, A], and what planes of the state hold at their targets afterwards."""
+TakeEffect = Callable[[WorldState, Attempts], tuple[WorldState, ActionResult]]
+"""Lets attempts take effect: returns the worlds after it, and what each action came to."""
 
 
 class TeamRule(Protocol):
@@ -24,8 +40,8 @@ class TeamRule(Protocol):
         """Return which actions are open, bool [B, A, actions], of those that the agents' abilities allow."""
         ...
 
-    def around(self, state: WorldState, running: Tensor, acts: Acts) -> tuple[WorldState, ActionResult]:
-        """Return worlds after the agents' acts, in those that go on, bool [B], and the result of each action."""
+    def around(self, state: WorldState, attempts: Attempts, take_effect: TakeEffect) -> tuple[WorldState, ActionResult]:
+        """Return worlds after the attempts that it lets take effect, and what each action came to."""
         ...
 
     def grounded(self, state: WorldState, roles: RoleTable) -> Tensor | None:
@@ -75,7 +91,7 @@ def grounded_by(rules: Sequence[TeamRule], now: AgentContext) -> list[Tensor]:
     return [each for each in found if each is not None]
 
 
-def changed(state: WorldState, target: Tensor, effects: list[tuple[Tensor, Mapping[str, Tensor | int]]]) -> WorldState:
+def changed(state: WorldState, target: Tensor, effects: Sequence[AgentEffect]) -> WorldState:
     """Return worlds with what credited acts make of their targets, int64 [B, A].
 
     It is written as sums of differences, so that the order of the agents does not matter.

@@ -13,7 +13,16 @@ from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state.role import ROLES, RoleTable, role_names, role_table
 from warp_torchrl.world.state.state import Action, ActionResult, Vehicles, WorldState
 from warp_torchrl.world.team.abilities import ABILITIES, PAPER_ABILITIES, AgentContext
-from warp_torchrl.world.team.acting import Acts, TeamAbility, TeamRule, changed, grounded_by, is_second
+from warp_torchrl.world.team.acting import (
+    AgentEffect,
+    Attempts,
+    TakeEffect,
+    TeamAbility,
+    TeamRule,
+    changed,
+    grounded_by,
+    is_second,
+)
 from warp_torchrl.world.team.presence import staying
 from warp_torchrl.world.team.start import starting_cells
 from warp_torchrl.world.team.supply import filled
@@ -176,35 +185,11 @@ class Team:
         Returns:
             The worlds after it, and what each action came to.
         """
-        acts: Acts = partial(
-            self._act,
-            action=staying(state, action),
-            running=running,
-            last_spreading=last_spreading,
-            wet_ticks=wet_ticks,
-            rules=rules,
-        )
-        for rule in rules:
-            acts = partial(rule.around, running=running, acts=acts)
-        return acts(state)
-
-    def _act(
-        self,
-        state: WorldState,
-        *,
-        action: Tensor,
-        running: Tensor,
-        last_spreading: int,
-        wet_ticks: int,
-        rules: Sequence[TeamRule],
-    ) -> tuple[WorldState, ActionResult]:
-        """Return the worlds after the acts of the agents' abilities, and what each came to; see ``act``."""
+        action = staying(state, action)
+        origin = state.vehicles.position
         state, moved = self._move(state, action, running, rules)
-        running = running[:, None]
-        now = self._context(state, last_spreading, wet_ticks)
-        target = now.own_cell
-        vehicles, tank = state.vehicles, state.vehicles.tank
-        chosen, effects = [], []
+        now, running = self._context(state, last_spreading, wet_ticks), running[:, None]
+        target, water, chosen, effects = now.own_cell, torch.zeros_like(moved), [], []
         for each in self.abilities:
             if each.ability.moves:
                 continue
@@ -214,23 +199,45 @@ class Team:
             if effect.target is not None:
                 target = torch.where(done, effect.target, target)
             if effect.takes_water is not None:
-                tank = tank - (wanted & effect.takes_water & (vehicles.tank > 0)).to(torch.int32)
+                water = water | (wanted & effect.takes_water & (state.vehicles.tank > 0))
             chosen.append(wanted)
             effects.append((done, effect.becomes))
-        acting = reduce(or_, [done for done, _ in effects])
-        redundant = is_second(target, acting)
-        credited = acting & ~redundant
+        acts = reduce(or_, [done for done, _ in effects])
+        attempts = Attempts(action, running, origin, moved, acts, target, water, torch.zeros_like(acts))
+        take_effect: TakeEffect = partial(self._take_effect, chosen=reduce(or_, chosen), effects=effects)
+        for rule in rules:
+            take_effect = partial(rule.around, take_effect=take_effect)
+        return take_effect(state, attempts)
+
+    def _take_effect(
+        self, state: WorldState, attempts: Attempts, *, chosen: Tensor, effects: Sequence[AgentEffect]
+    ) -> tuple[WorldState, ActionResult]:
+        """Return the worlds after attempts have taken effect, and what each action came to.
+
+        Args:
+            state: The worlds after the moves.
+            attempts: Of the agents, but for what rules hold back.
+            chosen: Which agents chose to act, bool [B, A].
+            effects: Of each ability which agents would have an effect, bool [B, A], and what planes hold afterwards.
+        """
+        action, target, vehicles = attempts.action, attempts.target, state.vehicles
+        redundant = is_second(target, attempts.acts)
+        credited = attempts.acts & ~redundant
         after = changed(state, target, [(done & credited, becomes) for done, becomes in effects])
+        tank = vehicles.tank - attempts.takes_water.to(torch.int32)
         after = after.replace(
             vehicles=vehicles.replace(
                 tank=tank if self.tank is None else filled(state, tank, self.tank),
-                last_action=torch.where(running, action, vehicles.last_action),
-                acts=vehicles.acts + reduce(or_, chosen),
+                last_action=torch.where(attempts.running, action, vehicles.last_action),
+                acts=vehicles.acts + chosen,
                 redundant=vehicles.redundant + redundant,
-                last_useful=torch.where(credited, state.step[:, None], vehicles.last_useful),
+                last_useful=torch.where(credited | attempts.is_useful, state.step[:, None], vehicles.last_useful),
             )
         )
-        return after, ActionResult(action=action, moved=moved, credited=credited, redundant=redundant, target=target)
+        result = ActionResult(
+            action=action, moved=attempts.moved, credited=credited, redundant=redundant, target=target
+        )
+        return after, result
 
     def _context(self, state: WorldState, last_spreading: int, wet_ticks: int = 0) -> AgentContext:
         return AgentContext(state, self.table(state.cells.device), self.extinguish_p, last_spreading, wet_ticks)

@@ -74,10 +74,12 @@ def test_the_heading_is_that_of_the_last_move():
 
 def test_the_level_that_a_fuel_needs_decides_what_is_held():
     load = Drops()._load
-    level, fuel = torch.tensor([4.0, 4.0, 2.0, 1.0]), torch.tensor([10, 4, 10, 1], dtype=torch.uint8)
+    level, fuel = torch.tensor([4.0, 4.0, 2.0, 1.0, 3.0]), torch.tensor([10, 4, 10, 1, 3], dtype=torch.uint8)
     most, usual = intensity_of(3.4), intensity_of(2.4)
-    # Litter needs 4, chaparral more than 6, grass 1.
-    assert held_intensity(level, fuel, load).tolist() == pytest.approx([usual, usual / 2, usual / 2, usual], rel=1e-5)
+    # Litter needs 4, chaparral more than 6, grass 1, tall grass 3.
+    assert held_intensity(level, fuel, load).tolist() == pytest.approx(
+        [usual, usual / 2, usual / 2, usual, usual], rel=1e-5
+    )
     assert held_intensity(torch.tensor([4.0]), torch.tensor([1], dtype=torch.uint8), load).item() == pytest.approx(most)
 
 

@@ -13,7 +13,7 @@ from warp_torchrl import make_env
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.system.device import unread
 from warp_torchrl.world.air.wind import Uniform
-from warp_torchrl.world.arrays.listing import first_cells
+from warp_torchrl.world.arrays.shortlist import first_cells
 from warp_torchrl.world.behaviour.firebrands import Firebrands
 from warp_torchrl.world.law.arrivals import arrivals_in
 from warp_torchrl.world.law.fire import Fire

@@ -58,8 +58,8 @@ class Arrivals(Mechanic):
         stations: (row, column) of where it comes from, in cells of the landscape's source, on the map or off it. The
             way from there to where it joins is added at its speed.
         speeds: Speed of travel [km/h]; of roles that are not named 60 for ugv, 180 uav, 250 scout, 450 tanker.
-        detour: Length of a way on roads over that as the crow flies, of vehicles that do not fly: 1.2 to 1.5 (Ballou,
-            Rahardja and Sakai 2002).
+        detour: Length of a way on roads over that as the crow flies, of vehicles that do not fly. It
+            is about 1.2 in cities (Newell 1980); 1.3 is ours.
         variation: Coefficient of variation of these times, log-normal with median 1, drawn for each vehicle.
         stays: For how long it is on the scene at a time: a shift, or what its fuel lasts [min]; not named, for ever.
         away: For how long it is away between two stays, to rest or refuel [min]; not named, it does not come back. The

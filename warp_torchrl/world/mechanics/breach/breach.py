@@ -8,8 +8,9 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.geometry import grow, neighbour_in
-from warp_torchrl.world.arrays.listing import filled, first_cells
+from warp_torchrl.world.arrays.listing import filled
 from warp_torchrl.world.arrays.random import Stream, named_key, uniform
+from warp_torchrl.world.arrays.shortlist import first_cells
 from warp_torchrl.world.backends.backend import advance_rows
 from warp_torchrl.world.behaviour.firebreaks import holds_up_to, intensity_of
 from warp_torchrl.world.ignition.intervention import ignited

@@ -13,25 +13,33 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.blocks import block_means
-from warp_torchrl.world.backends.backend import advance_rows
+from warp_torchrl.world.arrays.bytes import above
+from warp_torchrl.world.backends.backend import advance_any, advance_rows
 from warp_torchrl.world.behaviour.firebreaks import intensity_of
 from warp_torchrl.world.law.anderson import anderson_numbers
 from warp_torchrl.world.law.automaton import at_cells
 from warp_torchrl.world.law.flames import heat_of
 from warp_torchrl.world.law.rate import RateFire
-from warp_torchrl.world.mechanics.drops.loads import LEAST, LITRES_PER_LEVEL, Load, Loads, coverage_map, fallen, held
+from warp_torchrl.world.mechanics.drops.loads import (
+    LEAST,
+    LITRES_PER_LEVEL,
+    Drop,
+    Load,
+    Loads,
+    coverage_map,
+    fallen,
+    held,
+)
+from warp_torchrl.world.mechanics.drops.readiness import HOURS, Limits, daylight_left, loading, may_drop
 from warp_torchrl.world.mechanics.drops.smoke import smoke_at
 from warp_torchrl.world.mechanics.mechanic import Mechanic, Metric, Rules
 from warp_torchrl.world.mechanics.table import mechanic
 from warp_torchrl.world.state.role import ROLES, RoleTable
 from warp_torchrl.world.state.state import Action, ActionResult, WorldState
-from warp_torchrl.world.team.abilities import own_cell, youngest_fire
-from warp_torchrl.world.team.acting import Acts, changed
+from warp_torchrl.world.team.abilities import own_cell
+from warp_torchrl.world.team.acting import Attempts, TakeEffect
 
-_HOURS = 24.0
 _MOVES = 8
-_TOUCHED = ("cells", "age", "extinguished", "wet")
-"""Planes that putting out changes."""
 
 
 @mechanic("drops")
@@ -90,8 +98,8 @@ class Drops(Mechanic):
             level=(0.1, 25.0),
             half_life=(0.1, 1e5),
             turnaround=(0.0, 1e4),
-            begins=(0.0, _HOURS),
-            daylight=(0.0, _HOURS),
+            begins=(0.0, HOURS),
+            daylight=(0.0, HOURS),
             smoke=(0.0, 1e3),
             smoke_length=(1, 64),
             minutes_per_tick=(1e-3, 1440.0),
@@ -126,6 +134,7 @@ class Drops(Mechanic):
             aircraft=aircraft.expand(vehicles.tank.shape).contiguous(),
             heading=torch.zeros_like(vehicles.last_action),
             waits=torch.zeros_like(vehicles.tank),
+            smoke=self._smoke(state),
             drops=torch.zeros_like(state.step),
             hits=torch.zeros_like(state.step),
             minutes=minutes,
@@ -136,9 +145,8 @@ class Drops(Mechanic):
 
     def masked(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return which actions are open, bool [B, A, actions]: no drop at night, in smoke, or while aircraft load."""
-        drop = int(Action.EXTINGUISH)
-        able = mask[..., drop] & self._may_drop(state)
-        after = torch.cat((mask[..., :drop], able[..., None], mask[..., drop + 1 :]), dim=-1)
+        after = mask.clone()
+        after[..., int(Action.EXTINGUISH)] &= may_drop(state, self._limits)
         return torch.where(after.any(dim=-1, keepdim=True), after, mask)
 
     def grounded(self, state: WorldState, roles: RoleTable) -> Tensor | None:
@@ -149,41 +157,32 @@ class Drops(Mechanic):
         """Return whose tanks fill at the base alone, bool [B, A]: aircraft with retardant; None of water."""
         return state.planes(self.name, Loads).aircraft if self.agent == "retardant" else None
 
-    def around(self, state: WorldState, running: Tensor, acts: Acts) -> tuple[WorldState, ActionResult]:
-        """Let the vehicles act, and put drops in the place of what aircraft put out."""
-        after, result = acts(state)
-        loads = state.planes(self.name, Loads)
-        there = after.replace(cells=state.cells)
-        ours = loads.aircraft & (result.action == int(Action.EXTINGUISH)) & running[:, None]
-        acting = ours & (result.credited | result.redundant)
-        dropped = acting & self._may_drop(there)
-        kept = {name: at_cells(getattr(state, name).view(torch.uint8), result.target) for name in _TOUCHED}
-        after = changed(after, result.target, [(ours & result.credited, kept)])
-        after, hit, coverage = fallen(after, there, dropped, result.target, self._load)
-        tank, waits = self._tanks(state, there, ours & ~(acting & ~dropped), running[:, None])
-        vehicles = after.vehicles
-        vehicles = vehicles.replace(
-            tank=torch.where(loads.aircraft, tank, vehicles.tank),
-            redundant=vehicles.redundant - (ours & result.redundant).to(torch.int32),
-            last_useful=torch.where(
-                ours, torch.where(hit, state.step[:, None], state.vehicles.last_useful), vehicles.last_useful
-            ),
-        )
-        loads = loads.replace(
-            coverage=coverage,
+    def around(self, state: WorldState, attempts: Attempts, take_effect: TakeEffect) -> tuple[WorldState, ActionResult]:
+        """Let the other vehicles act, and then the loads fall; who may not drop keeps its load."""
+        loads, running = state.planes(self.name, Loads), attempts.running
+        ours = loads.aircraft & (attempts.action == int(Action.EXTINGUISH))
+        tries = ours & attempts.acts
+        falls = tries & may_drop(state, self._limits)
+        held = attempts._replace(acts=attempts.acts & ~ours, takes_water=attempts.takes_water & (falls | ~tries))
+        after, result = take_effect(state, held)
+        drop = Drop(after, state.cells, falls, attempts.target, torch.zeros_like(falls))
+        fell = advance_any(drop, falls, lambda whole: fallen(whole, self._load))
+        after, hit = fell.state, fell.hit
+        left = state.vehicles.tank - held.takes_water.to(torch.int32)
+        tank, waits = loading(after, left, running, self.agent == "retardant")
+        last_useful = torch.where(hit, state.step[:, None], after.vehicles.last_useful)
+        loads = after.planes(self.name, Loads).replace(
             heading=torch.where(result.moved & (result.action < _MOVES), result.action, loads.heading),
             waits=waits,
-            drops=loads.drops + dropped.sum(dim=1, dtype=torch.int32),
+            drops=loads.drops + falls.sum(dim=1, dtype=torch.int32),
             hits=loads.hits + hit.sum(dim=1, dtype=torch.int32),
         )
-        return after.replace(vehicles=vehicles).with_planes(self.name, loads), result.replace(
-            credited=torch.where(ours, hit, result.credited), redundant=result.redundant & ~ours
-        )
+        after = after.replace(vehicles=after.vehicles.replace(tank=tank, last_useful=last_useful))
+        return after.with_planes(self.name, loads), result.replace(credited=result.credited | hit)
 
     def after_tick(self, state: WorldState, ticks_now: Tensor, world: Rules) -> WorldState:
         """Return worlds whose covered trees do not catch fire in the next tick, where the coverage holds."""
-        is_covered = (state.planes(self.name, Loads).coverage > 0.0).flatten(1).any(dim=1)
-        return advance_rows(state, ticks_now & is_covered, lambda rows, ticks: held(rows, ticks, self._load))
+        return advance_rows(state, ticks_now, self._held)
 
     def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
         """Return ``on_target``."""
@@ -206,8 +205,8 @@ class Drops(Mechanic):
         """
         loads, own = state.planes(self.name, Loads), own_cell(state)
         loaded = 1.0 - loads.waits / max(loads.turnaround, 1)
-        smoke = torch.zeros_like(loaded) if self.smoke is None else smoke_at(state, self.smoke_length)
-        left = self._daylight(state)[:, None].expand_as(loaded) / 12.0
+        smoke = torch.zeros_like(loaded) if loads.smoke is None else loads.smoke
+        left = daylight_left(state, self._limits)[:, None].expand_as(loaded) / 12.0
         covered = at_cells(loads.coverage, own) / self.level
         limit = max(self.smoke or 0.0, 0.1)
         return torch.stack((loaded, smoke / limit, left, covered), dim=-1).clamp(0.0, 3.0)
@@ -218,7 +217,7 @@ class Drops(Mechanic):
 
     def picture(self, state: WorldState, side: int) -> Tensor:
         """Return the share of each block that drops cover, float32 [B, A, 1, side, side]."""
-        share = block_means(state.planes(self.name, Loads).coverage > LEAST, side)
+        share = block_means(above(state.planes(self.name, Loads).coverage, LEAST), side)
         return share[:, None, None].expand(-1, state.vehicles.tank.shape[1], -1, -1, -1)
 
     @property
@@ -227,38 +226,20 @@ class Drops(Mechanic):
         area = self.litres / (LITRES_PER_LEVEL * self.level)
         return Load(area / self.width, self.level, self.holds, self.most, half_life, intensity_of(self.flame_length))
 
-    def _may_drop(self, state: WorldState) -> Tensor:
-        """Return which agents may act, bool [B, A]: all but aircraft that load, or are in the dark or in smoke."""
-        loads = state.planes(self.name, Loads)
-        may = (loads.waits == 0) & (self._daylight(state) > 0.0)[:, None]
-        if self.smoke is not None:
-            may = may & (smoke_at(state, self.smoke_length) <= self.smoke)
-        return may | ~loads.aircraft
+    def step(self, before: WorldState, after: WorldState, running: Tensor, world: Rules) -> WorldState:
+        """Return worlds after a step, with the smoke that is over the agents now."""
+        return after.with_planes(self.name, after.planes(self.name, Loads).replace(smoke=self._smoke(after)))
 
-    def _daylight(self, state: WorldState) -> Tensor:
-        """Return the hours of daylight that are left, float32 [B]; 0 at night."""
-        begins, ends = self.daylight
-        hour = (self.begins + state.tick * (state.planes(self.name, Loads).minutes / 60.0)) % _HOURS
-        return torch.where((hour >= begins) & (hour < ends), ends - hour, 0.0)
+    def _held(self, state: WorldState, ticks_now: Tensor) -> WorldState:
+        is_covered = state.planes(self.name, Loads).coverage.flatten(1).amax(dim=1) > 0.0
+        return advance_rows(state, ticks_now & is_covered, lambda rows, ticks: held(rows, ticks, self._load))
 
-    def _tanks(self, before: WorldState, there: WorldState, spent: Tensor, running: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the tanks of aircraft, and the steps that they load, int32 [B, A] each.
+    def _smoke(self, state: WorldState) -> Tensor | None:
+        return None if self.smoke is None else smoke_at(state, self.smoke_length)
 
-        Args:
-            before: The worlds before the step.
-            there: The worlds after it, with the fires of before.
-            spent: Which aircraft chose to drop and were not kept from it, bool [B, A].
-            running: Worlds that go on, bool [B, 1].
-        """
-        loads, old = before.planes(self.name, Loads), before.vehicles.tank
-        _, has_fire = youngest_fire(there, loads.last_spreading)
-        left = old - (spent & has_fire & (old > 0)).to(torch.int32)
-        loading = there.vehicles.tank > left
-        if self.agent == "retardant":
-            loading = loading & (there.vehicles.position == there.vehicles.base[:, None]).all(dim=-1)
-        loading = loading & loads.aircraft & running
-        waits = torch.where(running, (loads.waits - 1).clamp(min=0), loads.waits)
-        return torch.where(loading, there.vehicles.tank, left), torch.where(loading, loads.turnaround, waits)
+    @property
+    def _limits(self) -> Limits:
+        return Limits(self.begins, self.daylight, self.smoke)
 
 
 def _drops(role: str) -> bool:

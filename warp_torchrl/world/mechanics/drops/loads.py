@@ -5,12 +5,14 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor
+from torch.nn.functional import threshold
 
 from warp_torchrl.world.arrays.batch import Batch
-from warp_torchrl.world.arrays.blocks import sums_about
+from warp_torchrl.world.arrays.bytes import above
 from warp_torchrl.world.arrays.constants import whole_numbers
-from warp_torchrl.world.arrays.geometry import offsets
-from warp_torchrl.world.arrays.listing import first_cells
+from warp_torchrl.world.arrays.geometry import grow, offsets
+from warp_torchrl.world.arrays.shortlist import first_cells
+from warp_torchrl.world.arrays.squares import clamped
 from warp_torchrl.world.behaviour.firebreaks import intensity_of
 from warp_torchrl.world.law.automaton import at_cells
 from warp_torchrl.world.law.flames import front_towards, strongest_into
@@ -20,8 +22,10 @@ from warp_torchrl.world.team.acting import changed, is_second
 
 LITRES_PER_LEVEL = 0.40746
 """Litres to a square metre in a coverage level of 1, a US gallon to 100 square feet."""
-_NEEDED = (1, 1, 2, 2, 8, 3, 6, 6, 2, 2, 4, 3, 8, 8)
-"""Coverage level by Anderson's number, 0 first; 8 where the source says more than 6."""
+_NEEDED = (1, 1, 2, 3, 8, 3, 6, 6, 2, 2, 4, 3, 8, 8)
+"""Coverage level by Anderson's number, 0 first: 1, 2, 3, 5 and 8 to 11 by table 1 of the airtanker drop guides of the
+US Forest Service. Those of 4, 6, 7, 12 and 13 are ours: 6 for tall brush, 8 for heavy fuels, which need more than 6
+(NWCG, glossary)."""
 _SHARE, _FEWEST = 256, 16
 """One in so many cells of a map is covered and beside fire in a tick at most, or as many as that on a small one."""
 LEAST = 0.05
@@ -38,6 +42,7 @@ class Loads(Batch):
     aircraft: Tensor  # bool [B,A], drops what it carries
     heading: Tensor  # int64 [B,A], direction of the last move, north before the first
     waits: Tensor  # int32 [B,A], steps until it has loaded
+    smoke: Tensor | None  # float32 [B,A], over each agent; None where no smoke is too much
     drops: Tensor  # int32 [B], so far
     hits: Tensor  # int32 [B], of which put out a fire
     minutes: float  # of a tick
@@ -55,34 +60,46 @@ class Load(NamedTuple):
     half_life: float  # of the level [minutes]
     alike: float  # intensity of all fire under laws without one [kW/m]
 
+    @property
+    def least(self) -> float:
+        """Return the intensity of the strongest fronts that its level holds in any fuel [kW/m]."""
+        return min(intensity_of(self.holds) * self.level / max(_NEEDED), intensity_of(self.most))
 
-def fallen(
-    after: WorldState, there: WorldState, dropped: Tensor, target: Tensor, load: Load
-) -> tuple[WorldState, Tensor, Tensor]:
-    """Return worlds after drops, which of them put out a fire, bool [B, A], and the coverage.
 
-    Args:
-        after: The worlds after all other acts.
-        there: The worlds in which the aircraft dropped.
-        dropped: Which agents did, bool [B, A].
-        target: Flat index of the first cell of each, int64 [B, A].
-        load: What falls.
-    """
-    loads, (height, width) = there.planes("drops", Loads), there.cells.shape[1:]
+@dataclass(eq=False, repr=False)
+class Drop(Batch):
+    """Loads that fall in worlds."""
+
+    state: WorldState  # after all other acts
+    cells: Tensor  # uint8 [B,H,W], the cells before them
+    falls: Tensor  # bool [B,A], which agents drop
+    target: Tensor  # int64 [B,A], flat index of the first cell of each
+    hit: Tensor  # bool [B,A], which have put out a fire
+
+
+def fallen(drop: Drop, load: Load) -> Drop:
+    """Return worlds after loads have fallen, and which of them put out a fire."""
+    after, there = drop.state, drop.state.replace(cells=drop.cells)
+    loads, (height, width) = after.planes("drops", Loads), after.cells.shape[1:]
     count = min(max(1, round(load.length / there.ground.cell_size)), max(height, width))
-    cells, on_map = pattern(target, loads.heading, count, (height, width))
-    cell, falls = cells.flatten(1), (on_map & dropped[..., None]).flatten(1)
-    place = there.vehicles.position[:, :, None].expand(-1, -1, count, -1).flatten(1, 2)
-    front = front_towards(there, loads.heat, load.alike, cell, place)
-    most = held_intensity(torch.full_like(front, load.level), at_cells(loads.fuel, cell), load)
+    cells, on_map = pattern(drop.target, loads.heading, count, (height, width))
+    cell, falls = cells.flatten(1), (on_map & drop.falls[..., None]).flatten(1)
     codes, wet = at_cells(after.cells, cell), at_cells(after.wet, cell).clamp(min=1)
-    burns = (codes >= FIRST_FIRE) & (codes <= loads.last_spreading)
-    stands = is_tree(codes) & (strongest_into(after, loads.heat, load.alike, cell) <= most)
-    out, stands = (each & ~is_second(cell, each) for each in (falls & burns & (front <= most), falls & stands))
+    out = falls & (codes >= FIRST_FIRE) & (codes <= loads.last_spreading)
+    stands = falls & is_tree(codes)
+    if loads.heat is not None or load.alike >= load.least:  # else any drop holds all flames
+        place = there.vehicles.position[:, :, None].expand(-1, -1, count, -1).flatten(1, 2)
+        front = front_towards(there, loads.heat, load.alike, cell, place)
+        most = held_intensity(torch.full_like(front, load.level), at_cells(loads.fuel, cell), load)
+        out = out & (front <= most)
+        stands = stands & (strongest_into(after, loads.heat, load.alike, cell) <= most)
+    first = ~is_second(cell, out | stands)  # a cell burns or stands, not both
+    out, stands = out & first, stands & first
     becomes: dict[str, Tensor | int] = {"cells": at_cells(after.age, cell), "age": 0, "extinguished": 1, "wet": wet}
     after = changed(after, cell, [(out, becomes), (stands, {"wet": wet})])
     coverage = loads.coverage.flatten(1).scatter_reduce(1, cell, load.level * falls, "amax").view_as(loads.coverage)
-    return after, out.view_as(cells).any(dim=-1), coverage
+    after = after.with_planes("drops", loads.replace(coverage=coverage))
+    return drop.replace(state=after, hit=out.view_as(cells).any(dim=-1))
 
 
 def held(state: WorldState, ticks_now: Tensor, load: Load) -> WorldState:
@@ -92,9 +109,8 @@ def held(state: WorldState, ticks_now: Tensor, load: Load) -> WorldState:
     """
     loads, here = state.planes("drops", Loads), ticks_now[:, None, None]
     coverage = loads.coverage * torch.where(here, 0.5 ** (loads.minutes / load.half_life), 1.0)
-    coverage = coverage * (coverage > LEAST)
-    by_fire = sums_about(is_burning(state.cells).to(coverage.dtype)[:, None], 1)[:, 0] > 0.5
-    near = here & (coverage > 0.0) & is_tree(state.cells) & by_fire
+    coverage = threshold(coverage, LEAST, 0.0)
+    near = here & above(coverage, 0.0) & is_tree(state.cells) & grow(is_burning(state.cells))
     cell, is_near = first_cells(near, max(_FEWEST, near[0].numel() // _SHARE))
     front = strongest_into(state, loads.heat, load.alike, cell)
     holds = front <= held_intensity(at_cells(coverage, cell), at_cells(loads.fuel, cell), load)
@@ -114,13 +130,11 @@ def pattern(target: Tensor, heading: Tensor, count: int, size: tuple[int, int]) 
     Returns:
         int64 and bool [B, A, count].
     """
-    height, width = size
     ahead = torch.arange(count, device=target.device)
-    way = offsets(target.device)[heading]
-    row = target.div(width, rounding_mode="floor")[..., None] + way[..., :1] * ahead
-    column = (target % width)[..., None] + way[..., 1:] * ahead
-    on_map = (row >= 0) & (row < height) & (column >= 0) & (column < width)
-    return row.clamp(0, height - 1) * width + column.clamp(0, width - 1), on_map
+    start = torch.stack((target.div(size[1], rounding_mode="floor"), target % size[1]), dim=-1)
+    place, is_on_map = clamped(start[..., None] + offsets(target.device)[heading][..., None] * ahead, size)
+    (row, column), (has_row, has_column) = place.unbind(-2), is_on_map.unbind(-2)
+    return torch.add(column, row, alpha=size[1]), has_row & has_column
 
 
 def held_intensity(level: Tensor, fuel: Tensor, load: Load) -> Tensor:
@@ -128,8 +142,8 @@ def held_intensity(level: Tensor, fuel: Tensor, load: Load) -> Tensor:
 
         I = I(L) c / n,    at most I(L_most)
 
-    n is the level that the fuel needs (NWCG, Incident Response Pocket Guide, PMS 461; George 1981); I(L) is Byram's
-    intensity of flames of length L. That it goes with the water on an area is ours.
+    n is the level that the fuel needs, see ``_NEEDED``; I(L) is Byram's intensity of flames
+    of length L. That it goes with the water on an area is ours.
 
     Args:
         level: c.

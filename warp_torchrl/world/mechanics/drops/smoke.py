@@ -3,6 +3,8 @@
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.arrays.constants import numbers
+from warp_torchrl.world.arrays.squares import clamped
 from warp_torchrl.world.law.automaton import at_cells
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.state import WorldState
@@ -17,15 +19,16 @@ def smoke_at(state: WorldState, length: int) -> Tensor:
         state: The worlds.
         length: How far smoke drifts [cells].
     """
-    (height, width), position = state.cells.shape[1:], state.vehicles.position
-    east, north = state.wind.mean(dim=(2, 3)).unbind(1)
-    speed = torch.sqrt(east * east + north * north)
-    way = torch.stack((-north, east), dim=-1) / speed.clamp(min=1e-6)[:, None]  # rows grow south
-    far = torch.arange(length + 1, device=position.device)
-    upwind = position[:, :, None] - (way[:, None, None] * far[:, None]).round().to(torch.int64)
-    row, column = upwind.unbind(-1)
-    drifts = (speed > 1e-6)[:, None, None] | (far == 0)
-    on_map = (row >= 0) & (row < height) & (column >= 0) & (column < width) & drifts
-    cell = row.clamp(0, height - 1) * width + column.clamp(0, width - 1)
-    burns = is_burning(at_cells(state.cells, cell.flatten(1))).view_as(cell) & on_map
-    return (burns / (1.0 + far)).sum(dim=-1)
+    wind = state.wind[:, :, 0, 0] if state.wind.shape[2:] == (1, 1) else state.wind.mean(dim=(2, 3))
+    east, north = wind.unbind(1)
+    speed = torch.sqrt(east * east + north * north)[:, None]
+    way = torch.stack((-north, east), dim=-1) / speed.clamp(min=1e-6)  # rows grow south
+    far = numbers(tuple(range(length + 1)), wind.device)
+    upwind = state.vehicles.position[..., None] - (way[:, None, :, None] * far).round().to(torch.int64)
+    place, is_on_map = clamped(upwind, state.cells.shape[1:])
+    row, column = place.unbind(-2)
+    cell = torch.add(column, row, alpha=state.cells.shape[2])
+    has_row, has_column = is_on_map.unbind(-2)
+    burns = is_burning(at_cells(state.cells, cell.flatten(1))).view_as(cell) & has_row & has_column
+    weight = (1.0 / (1.0 + far)) * ((speed > 1e-6) | (far == 0.0))
+    return (burns * weight[:, None]).sum(dim=-1)

@@ -34,10 +34,7 @@ from warp_torchrl.world.mechanics.table import mechanic
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import Action, ActionResult, WorldState
 from warp_torchrl.world.team.abilities import AgentContext, own_cell
-from warp_torchrl.world.team.acting import Acts, changed
-
-_TOUCHED = ("cells", "age", "extinguished", "wet", "firebreak")
-"""Planes that clearing and putting out change."""
+from warp_torchrl.world.team.acting import Attempts, TakeEffect
 
 
 @mechanic("lines")
@@ -141,33 +138,36 @@ class FireLines(Mechanic):
         share = torch.stack(
             (at_fire(state, fire_beside(state)[0], self._pace).share, at_line(state, self._pace).share), dim=-1
         )
-        first, last = int(Action.EXTINGUISH), int(Action.CLEAR) + 1
-        able = mask[..., first:last] & (share > 0)
-        after = torch.cat((mask[..., :first], able, mask[..., last:]), dim=-1)
+        after = mask.clone()
+        after[..., int(Action.EXTINGUISH) : int(Action.CLEAR) + 1] &= share > 0
         return torch.where(after.any(dim=-1, keepdim=True), after, mask)
 
-    def around(self, state: WorldState, running: Tensor, acts: Acts) -> tuple[WorldState, ActionResult]:
-        """Let the agents act, and take back what their work does not complete.
+    def around(self, state: WorldState, attempts: Attempts, take_effect: TakeEffect) -> tuple[WorldState, ActionResult]:
+        """Let the agents work, and hold back the acts that their work does not complete.
 
-        Agents that work at one cell are not redundant; the first of them is credited when it is completed.
+        Agents that work at one cell are not redundant; the first of them is credited when it is completed. Who cannot
+        work takes no water. Where mechanic ``drops`` lets aircraft drop, it says what that does.
         """
-        after, result = acts(state)
-        target, puts_out = result.target, result.action == int(Action.EXTINGUISH)
-        ours = (result.credited | result.redundant) & (puts_out | (result.action == int(Action.CLEAR)))
-        there = after.replace(cells=state.cells)
-        share = torch.where(puts_out, at_fire(there, target, self._pace).share, at_line(there, self._pace).share)
-        lines = state.planes(self.name, Lines)
-        widths = whole_numbers(self._widths, target.device)[lines.means]
-        made = progress(lines.work, target, puts_out, torch.where(ours, share, 0), widths)
-        undone = result.credited & ours & ~made.done
-        kept = {name: getattr(state, name).view(torch.uint8).flatten(1).gather(1, target) for name in _TOUCHED}
-        after = _counted(changed(after, target, [(undone, kept)]), state, result, ours, made.works)
-        credited = made.first & made.done
-        worked = lines.worked + made.works.sum(dim=1, dtype=torch.int32)
-        lines = lines.replace(work=made.work, worked=worked)
-        return after.with_planes(self.name, lines), result.replace(
-            credited=torch.where(ours, credited, result.credited), redundant=result.redundant & ~ours
+        lines, target = state.planes(self.name, Lines), attempts.target
+        puts_out = attempts.action == int(Action.EXTINGUISH)
+        ours = attempts.acts & (puts_out | (attempts.action == int(Action.CLEAR)))
+        share = torch.where(puts_out, at_fire(state, target, self._pace).share, at_line(state, self._pace).share)
+        able = ours & (share > 0)
+        aircraft, widths = state.plane("drops", "aircraft"), whole_numbers(self._widths, target.device)[lines.means]
+        drops = torch.zeros_like(able) if aircraft is None else able & puts_out & aircraft
+        made = progress(lines.work, target, puts_out, torch.where(able & ~drops, share, 0), widths)
+        held = attempts._replace(
+            acts=torch.where(ours, (made.first & made.done) | drops, attempts.acts),
+            takes_water=attempts.takes_water & (able | ~ours),
+            is_useful=attempts.is_useful | made.works,
         )
+        after, result = take_effect(state, held)
+        works, work = made.works, made.work
+        if aircraft is not None:  # fire that a drop puts out is done
+            hits = drops & result.credited
+            works, work = works | hits, progress(work, target, puts_out, torch.where(hits, DONE, 0), widths).work
+        lines = lines.replace(work=work, worked=lines.worked + works.sum(dim=1, dtype=torch.int32))
+        return after.with_planes(self.name, lines), result
 
     def workable(self, state: WorldState, world: Rules) -> Tensor | None:
         """Return the burning cells that some agent can work at, bool [B, H, W]; None where all flames are alike."""
@@ -245,23 +245,3 @@ def line_map(state: WorldState) -> Tensor:
     """Return how much of the line of each cell is done, 0..255, uint8 [B, H, W]; of a finished one 0."""
     begun = state.planes("lines", Lines).work.clamp(min=0) * (state.firebreak == 0)
     return (begun // (DONE // 256)).clamp(max=255).to(torch.uint8)
-
-
-def _counted(after: WorldState, before: WorldState, result: ActionResult, ours: Tensor, works: Tensor) -> WorldState:
-    """Return worlds whose vehicles are counted by their work: it is of use, not redundant; acts without take no water.
-
-    Args:
-        after: The worlds after the acts.
-        before: The worlds before them.
-        result: Of the acts.
-        ours: The acts that are work, bool [B, A].
-        works: Those of them that got some done, bool [B, A].
-    """
-    old, new = before.vehicles, after.vehicles
-    last_useful = torch.where(works, before.step[:, None], old.last_useful)
-    vehicles = new.replace(
-        tank=torch.where(ours & ~works, torch.maximum(old.tank, new.tank), new.tank),
-        redundant=new.redundant - (result.redundant & ours).to(torch.int32),
-        last_useful=torch.where(ours, last_useful, new.last_useful),
-    )
-    return after.replace(vehicles=vehicles)

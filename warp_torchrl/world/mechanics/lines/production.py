@@ -1,8 +1,9 @@
 """Rates at which crews and bulldozers build fireline, by fuel model and slope.
 
 Sources of the National Wildfire Coordinating Group (NWCG): sustained rates of crews of 20 with hand tools, for
-construction, burnout and holding, from the Incident Response Pocket Guide, PMS 461; rates of a type 3 bulldozer (90 to
-165 hp) in a single pass, from the Equipment Technology Committee's page on dozers. Fuels have Anderson's numbers
+construction, burnout and holding, from the Incident Response Pocket Guide, PMS 461, with which they were compared;
+rates of a type 3 bulldozer (90 to 165 hp) in a single pass, after the Equipment Technology Committee's page on dozers,
+with which they were not: take them as ours. Fuels have Anderson's numbers
 (``world.law.anderson``).
 """
 

@@ -17,7 +17,7 @@ from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.role import Role, add_role
 from warp_torchrl.world.state.state import ActionResult, WorldState
 from warp_torchrl.world.team.abilities import own_cell
-from warp_torchrl.world.team.acting import Acts, changed, is_second
+from warp_torchrl.world.team.acting import Attempts, TakeEffect, changed, is_second
 from warp_torchrl.world.team.places import approach_move, has_reached
 from warp_torchrl.world.team.presence import those_there
 from warp_torchrl.world.team.team import Team
@@ -86,19 +86,21 @@ class RetardantTeam(Team, Mechanic):
         sets_out = self._drops(state.cells.device) & ~has_reached(state)
         return torch.where(sets_out[..., None], alone, mask)
 
-    def around(self, state: WorldState, running: Tensor, acts: Acts) -> tuple[WorldState, ActionResult]:
+    def around(self, state: WorldState, attempts: Attempts, take_effect: TakeEffect) -> tuple[WorldState, ActionResult]:
         """Let the vehicles do as in any team, and the aircraft drop their retardant before and after it.
 
         An aircraft that treats a tree is credited for it, unless it was treated in this tick already: then that was
         redundant.
         """
-        drops, step = those_there(state, self._drops(running.device) & running[:, None]), state.step
-        target, reached = own_cell(state), has_reached(state) & running[:, None]
+        drops, step = those_there(state, self._drops(state.cells.device) & attempts.running), state.step
+        before = state.replace(vehicles=state.vehicles.replace(position=attempts.origin))
+        target, reached = own_cell(before), has_reached(before) & attempts.running
         treated = first = torch.zeros_like(drops)
         if self.treats == "path":
-            state, treated, first = _treat(state, drops)
-        state, result = acts(state)
-        state, ends, new = _treat(state, drops & result.moved if self.treats == "path" else drops)
+            state, treated, first = _treat(state, target, drops)
+        state, result = take_effect(state, attempts)
+        comes = drops & result.moved if self.treats == "path" else drops
+        state, ends, new = _treat(state, own_cell(state), comes)
         treated, first = treated | ends, first | new
         target = torch.where(drops, torch.where(ends, own_cell(state), target), result.target)
         redundant, vehicles = treated & ~first, state.vehicles
@@ -136,17 +138,18 @@ class RetardantTeam(Team, Mechanic):
         return self.table(device).index == (names.index(TANKER) if TANKER in names else -1)
 
 
-def _treat(state: WorldState, drops: Tensor) -> tuple[WorldState, Tensor, Tensor]:
-    """Return worlds in which vehicles treated their own burning cells.
+def _treat(state: WorldState, cell: Tensor, drops: Tensor) -> tuple[WorldState, Tensor, Tensor]:
+    """Return worlds in which vehicles treated burning cells.
 
     Args:
         state: The worlds.
+        cell: Flat index of the cell of each, int64 [B, A].
         drops: Which vehicles would, bool [B, A].
 
     Returns:
         The worlds, which vehicles treated a tree, and which were the first to do so in this tick, bool [B, A] each.
     """
-    cell, tank = own_cell(state), state.vehicles.tank
+    tank = state.vehicles.tank
     treated = drops & is_burning(state.cells.flatten(1).gather(1, cell)) & (tank != 0)
     first = treated & (state.wet.flatten(1).gather(1, cell) == 0)
     first = first & ~is_second(cell, first)

@@ -2,14 +2,15 @@
 
 import torch
 from torch import Tensor
-from torch.nn.functional import max_pool2d
 
 from warp_torchrl.world.arrays.constants import numbers
 
 LEVELS = (0.6096, 1.2192, 1.8288, 2.4384, 3.6576)
 """Flame lengths that part the six fire intensity levels, 2, 4, 6, 8 and 12 ft [m] (Scott, Thompson and Calkin 2013)."""
 HOMES = (0.25, 0.40, 0.55, 0.70, 0.85, 1.0)
-"""Share of a home's worth that is lost at each level (Scott and others 2020, Wildfire Risk to Communities)."""
+"""Share of a home's worth that is lost at each level. They are ours, after the form of the response functions of
+Wildfire Risk to Communities (Scott and others 2020): a quarter at the least flames, 0.15 more a level, all at the
+most."""
 RATES = {"ugv": 250.0, "uav": 2000.0, "scout": 500.0, "tanker": 7000.0}
 """US dollars an hour by role: a bulldozer of type 2 with its operator and transport, a helicopter of type 3, a light
 aircraft that leads others, a large airtanker. They are round numbers of the size of the rates that agencies publish
@@ -37,4 +38,11 @@ def longest_about(flames: Tensor, cells: int) -> Tensor:
         flames: Flame lengths, float32 [B, H, W] [m].
         cells: The distance.
     """
-    return flames if cells == 0 else max_pool2d(flames[:, None], 2 * cells + 1, stride=1, padding=cells)[:, 0]
+    for _ in range(cells):  # on CPUs several times faster than pooling
+        rows = flames.clone()
+        torch.maximum(rows[:, 1:], flames[:, :-1], out=rows[:, 1:])
+        torch.maximum(rows[:, :-1], flames[:, 1:], out=rows[:, :-1])
+        flames = rows.clone()
+        torch.maximum(flames[..., 1:], rows[..., :-1], out=flames[..., 1:])
+        torch.maximum(flames[..., :-1], rows[..., 1:], out=flames[..., :-1])
+    return flames

@@ -9,9 +9,11 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields, did_you_mean
 from warp_torchrl.world.arrays.batch import Batch
+from warp_torchrl.world.arrays.bytes import above, between
 from warp_torchrl.world.arrays.constants import numbers
 from warp_torchrl.world.arrays.geometry import grow
-from warp_torchrl.world.arrays.listing import filled, first_cells
+from warp_torchrl.world.arrays.listing import filled
+from warp_torchrl.world.arrays.shortlist import first_cells
 from warp_torchrl.world.backends.backend import advance_rows
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.law.fronts import front_at
@@ -187,23 +189,18 @@ class Values(Mechanic):
         return (1.0 - lost(exposure.flames, self.losses)) * exposure.spared
 
     def _expose(self, state: WorldState, ticks_now: Tensor, world: Rules) -> WorldState:
-        before, here = state.planes(self.name, Exposure), ticks_now[:, None, None]
-        burns = is_burning(state.cells)
+        before, here, burns = state.planes(self.name, Exposure), ticks_now[:, None, None], is_burning(state.cells)
         cells = min(int(self.reach / state.ground.cell_size), state.cells.shape[1])
-        bare = (before.worth > 0.0) & (state.alpha == 0.0)
-        matters = (before.worth > 0.0) | (grow(bare, cells) if cells else bare)
-        new = here & matters & (burns | state.burned) & ~before.met
+        has_worth = above(before.worth, 0.0)
+        bare = has_worth & ~above(state.alpha, 0.0)
+        new = here & (has_worth | grow(bare, cells)) & (burns | state.burned) & ~before.met
         flames, measured = self._flames(state, new, world.fire)
-        met = torch.maximum(flames, torch.where(bare, longest_about(flames, cells), 0.0))
-        glow = state.plane("embers", "falls")
-        caught = 0.0 if glow is None else self.ember_chance * glow.to(torch.float32) / 255.0
-        since, grows = (
-            state.tick * minutes_of_tick(world, self.minutes_per_tick),
-            (burns & ~before.burns).flatten(1).any(1),
-        )
+        met = torch.where(bare, longest_about(flames, cells), flames)
+        since = state.tick * minutes_of_tick(world, self.minutes_per_tick)
+        grows = (burns & ~before.burns).flatten(1).any(1)
         exposure = before.replace(
             flames=torch.maximum(before.flames, met),
-            spared=torch.where(here, before.spared * (1.0 - caught), before.spared),
+            spared=self._spared(state, before.spared, here),
             met=before.met | measured,
             burns=torch.where(here, burns, before.burns),
             grew=torch.where(ticks_now & grows, since, before.grew),
@@ -211,6 +208,12 @@ class Values(Mechanic):
             held=torch.where(ticks_now, _is_held(state, world), before.held),
         )
         return state.with_planes(self.name, exposure)
+
+    def _spared(self, state: WorldState, spared: Tensor, here: Tensor) -> Tensor:
+        """Return the chance that no ember has ignited an asset, float32 [B, H, W], after those that fell in a tick."""
+        glow = state.plane("embers", "falls")
+        caught = None if glow is None else self.ember_chance * glow.to(torch.float32) / 255.0
+        return spared if caught is None else torch.where(here, spared * (1.0 - caught), spared)
 
     def _flames(self, state: WorldState, new: Tensor, fire: Automaton) -> tuple[Tensor, Tensor]:
         """Return the flame length in marked cells that burn or have burned, float32 [B, H, W] [m]; else 0.
@@ -223,7 +226,7 @@ class Values(Mechanic):
         found = torch.where(is_there, front_at(fire, state, cell).flame_length.clamp(min=_FLAMES), 0.0)
         none = torch.zeros_like(state.alpha)
         flames = none.flatten(1).scatter_reduce(1, cell, found, "amax").view_as(none)
-        return flames, flames > 0.0
+        return flames, above(flames, 0.0)
 
     def _hourly(self, world: Rules) -> tuple[float, ...]:
         """Return what each vehicle costs [US dollars an hour]."""
@@ -233,7 +236,7 @@ class Values(Mechanic):
 
 def _is_held(state: WorldState, world: Rules) -> Tensor:
     """Return in which worlds no fire is beside what may burn, wet or not, and no ember smoulders, bool [B]."""
-    fuel = (state.cells >= world.fire.youngest_fuel) & (state.cells <= OLDEST) & (state.alpha > 0.0)
+    fuel = between(state.cells, world.fire.youngest_fuel, OLDEST) & above(state.alpha, 0.0)
     goes_on = (world.fire.spreads(state) & grow(fuel)).flatten(1).any(dim=1)
     for each in world.loop:
         smoulders = each.smoulders(state)
