@@ -19,6 +19,8 @@ COMMANDS = {
     "search": ("warp_torchrl.commands.search:main", "search values of a training's keys"),
     "keys": ("warp_torchrl.commands.usage:main", "tell what keys of worlds, teams and learners mean"),
     "summary": ("warp_torchrl.evaluation.summary:main", "summarise evaluations in one table"),
+    "submit": ("warp_torchrl.commands.board.submit:main", "play a policy on the frozen tasks of a board"),
+    "board": ("warp_torchrl.commands.board.table:main", "make the table of a board's rows"),
     "curves": ("warp_torchrl.commands.curves:main", "draw learning curves of runs"),
     "probe": ("warp_torchrl.commands.probe:main", "read a team's messages by linear probes"),
     "export": ("warp_torchrl.commands.export:main", "export a trained policy"),

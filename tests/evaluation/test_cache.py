@@ -55,7 +55,7 @@ def test_other_worlds_have_other_files(change):
 
 def test_another_code_has_other_files(monkeypatch):
     cache.store(plan_of(), played(plan_of()))
-    monkeypatch.setattr(cache, "_code", lambda: "another")
+    monkeypatch.setattr(cache, "code_digest", lambda: "another")
     assert cache.cached(plan_of(), ["noop", "greedy"]) == {}
 
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from omegaconf import DictConfig
 from tensordict.nn import TensorDictModuleBase
 
 from warp_torchrl.api.keywords import as_overrides, check_list
@@ -64,7 +65,7 @@ def evaluate(
     load([*plugins, *listed_plugins(overrides)])
     further, objects = as_overrides(keywords)
     chosen = [] if scenario is None else [f"scenario={scenario}"]
-    config, found = _composed(policy, [*chosen, *overrides, *further])
+    config, found = composed_evaluation(policy, [*chosen, *overrides, *further])
     values = {**plain(config), **objects}
     fires = map_fires({"maps": maps_fires is not None, "maps_fires": 1000 if maps_fires is None else maps_fires})
     kind = picture_kind({"picture": picture})
@@ -78,8 +79,17 @@ def evaluate(
     return evaluate_policy(config, path, found, worlds, fires, kind)
 
 
-def _composed(policy: Any, overrides: list[str]) -> tuple[Any, Any]:
-    """Return the configuration of an evaluation, composed, and what plays: a name, a checkpoint or a policy."""
+def composed_evaluation(policy: Any, overrides: Sequence[str]) -> tuple[DictConfig, Any]:
+    """Return the configuration of an evaluation, composed, and what plays: a name, a checkpoint or a policy.
+
+    Args:
+        policy: As of ``evaluate``.
+        overrides: In the command line's grammar, the scenario's among them.
+
+    Raises:
+        ConfigError: A ``ValueError``, with key, value and rule.
+        CheckpointError: If the policy is not sound.
+    """
     if isinstance(policy, Run):
         policy = policy.folder
     if isinstance(policy, TensorDictModuleBase):

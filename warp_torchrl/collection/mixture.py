@@ -19,7 +19,7 @@ class Kind:
 
     Attributes:
         scenario: One of ``conf/scenario``.
-        over: Keys of its worlds that have other values: ``{team: {n_agents: 2}, wind: wandering}``.
+        over: Keys of its worlds that have other values: ``{team: {n_agents: 2}, wind: wandering, wind.speed: 8}``.
         share: Share of the worlds, in proportion to the shares of the others.
         teacher: Teacher of its worlds; None takes ``imitation.teacher``.
         teacher_weight: Factor on ``imitation.weight`` and ``weight_end`` in its worlds.

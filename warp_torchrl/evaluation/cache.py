@@ -85,7 +85,7 @@ def _of_worlds(run_config: RunConfig) -> list[Any]:
     seeds = run_config.evaluation.first_seed, run_config.evaluation.episodes
     machine = torch.device(run_config.device).type, torch.backends.cpu.get_cpu_capability(), torch.__version__
     made = run_config.world.lighting, run_config.world.air  # for this landscape
-    return [run_config.world, *made, run_config.reward, roles, abilities, *seeds, *machine, _code()]
+    return [run_config.world, *made, run_config.reward, roles, abilities, *seeds, *machine, code_digest()]
 
 
 def digest(thing: Any) -> str:
@@ -143,7 +143,7 @@ def _name_of(kind: type) -> str:
 
 
 @lru_cache(maxsize=1)
-def _code() -> str:
+def code_digest() -> str:
     """Return a digest of the sources of the code that plays the episodes."""
     rooms = (path for room in _SOURCES for path in (_PACKAGE / room).rglob("*.py"))
     paths = sorted({*rooms, *_PACKAGE.glob("*.py")})

@@ -171,7 +171,7 @@ def _written(value: Any) -> str:
 
 def _world(config: Mapping[str, Any], kind: Kind) -> World:
     for key in kind.over:
-        if key not in WORLD_KEYS or key == "scenario":
+        if key.partition(".")[0] not in WORLD_KEYS or key == "scenario":
             raise ConfigError(f"over must name keys of the worlds, {', '.join(WORLD_KEYS[1:])}, got {key}")
     overrides = [f"{key}={_written(value)}" for key, value in dotted(kind.over).items()]
     values = plain(compose_config("train", [f"scenario={kind.scenario}", *overrides]))

@@ -1,0 +1,1 @@
+"""Boards: frozen lists of tasks, rows of policies that played them, and tables of rows."""
