@@ -137,6 +137,17 @@ def test_a_mistake_gets_one_line_and_writes_nothing(given, told, small, tmp_path
     assert not list(tmp_path.iterdir())
 
 
+def test_a_belief_is_chosen_where_sight_is_limited(tmp_path) -> None:
+    pytest.importorskip("warp_torchrl.world.mechanics.belief.belief")
+    overrides = ("horizon=12", "landscape.size=12")
+    search = a_task("two", scenario="search", overrides=overrides, rules="")
+    search = replace(search, rules=search.found_rules)
+    board = Board(name="small", tasks={"one": SMALL.tasks["one"], "two": search})
+    chosen = ("belief=ensemble", "belief.members=2", "belief.hidden=4")
+    known = [submit.play_board(board, [*board.tasks.values()], "oldest", "o", each, 1) for each in ((), chosen)]
+    assert [[played.knowledge for played in row.tasks.values()] for row in known] == [["alone", "alone"], ["alone", "team"]]
+
+
 def test_other_rules_are_not_played(tmp_path) -> None:
     with pytest.raises(ConfigError, match=r"one: this version plays other rules, \w{16}, than small froze, 0000"):
         submit.play_board(SMALL, [a_task("one", rules="0000")], "noop", "noop")

@@ -146,7 +146,8 @@ def play_board(
 def _play(task: Task, policy: str, chosen: Sequence[str], fires: int | None) -> Played:
     log.info("playing %s, %d fires", task.name, fires or task.fires)
     seeds = (f"evaluation.first_seed={task.first_seed}", f"evaluation.episodes={fires or task.fires}")
-    overrides = [*task.overrides, *chosen, *seeds, "evaluation.baselines=[]"]
+    own = chosen if task.world.sensing.is_limited else ()  # where agents see all there is nothing to believe
+    overrides = [*task.overrides, *own, *seeds, "evaluation.baselines=[]"]
     result = evaluate(policy, task.scenario, overrides=overrides, picture=None)
     config, _ = composed_evaluation(policy, [f"scenario={task.scenario}", *overrides])
     knowledge = knowledge_of(run_config(plain(config)), policy if policy in HEURISTICS else None)

@@ -59,9 +59,14 @@ class Task:
         return _FIRST + int.from_bytes(digest[:8], "big") % _SPAN
 
     @cached_property
+    def world(self) -> World:
+        """Return its rules as this version of the package has them."""
+        return world_of(self.scenario, self.overrides)
+
+    @property
     def found_rules(self) -> str:
         """Return the hash of the rules that this version of the package gives the task."""
-        return rules_of(world_of(self.scenario, self.overrides))
+        return rules_of(self.world)
 
     def points(self, value: float) -> float:
         """Return the points of a mean: 0 for ``noop``, 100 for ``reference``."""
