@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from warp_torchrl.models import Mlp
     from warp_torchrl.prediction.predict import predict
     from warp_torchrl.prediction.simulation import fire_history, simulate
-    from warp_torchrl.runs.config.plugins import add_scenario, register
+    from warp_torchrl.runs.config.registration import add_scenario, register
     from warp_torchrl.runs.policies.load import load_policy
     from warp_torchrl.world.air.wind import Uniform
     from warp_torchrl.world.behaviour.rate_of_spread import rate_of_spread
@@ -74,7 +74,7 @@ _PLACES = {
     "Uniform": "world.air.wind",
     "WildfireEnv": "env",
     "WorldState": "world.state.state",
-    "add_scenario": "runs.config.plugins",
+    "add_scenario": "runs.config.registration",
     "baselines": "api.names",
     "evaluate": "api.evaluate",
     "fire_history": "prediction.simulation",
@@ -82,7 +82,7 @@ _PLACES = {
     "make_env": "api.make",
     "predict": "prediction.predict",
     "rate_of_spread": "world.behaviour.rate_of_spread",
-    "register": "runs.config.plugins",
+    "register": "runs.config.registration",
     "scenarios": "api.names",
     "simulate": "prediction.simulation",
     "train": "api.train",
