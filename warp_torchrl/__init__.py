@@ -21,9 +21,6 @@ if "OMP_WAIT_POLICY" not in os.environ:
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import gymnasium
-import pettingzoo
-
 if TYPE_CHECKING:
     from warp_torchrl.algorithms.off_policy import OffPolicy
     from warp_torchrl.algorithms.on_policy import OnPolicy
@@ -48,14 +45,24 @@ if TYPE_CHECKING:
     from warp_torchrl.world.state.state import Transition, WorldState
     from warp_torchrl.world.terrain.array import Array
 
-gymnasium.register(
-    "Wildfire-v0",
-    entry_point="warp_torchrl.api.adapters:FireExtinguishingEnv",
-    vector_entry_point="warp_torchrl.api.adapters:FireExtinguishingVectorEnv",
-)
-if hasattr(pettingzoo, "register"):  # older ones have no registry
-    pettingzoo.register("parallel", "Wildfire-v0", entry_point="warp_torchrl.api.adapters:parallel_env")
-    pettingzoo.register("aec", "Wildfire-v0", entry_point="warp_torchrl.api.adapters.pettingzoo:env")
+
+def register_environments() -> None:
+    """Let Gymnasium and PettingZoo make our environments by name."""
+    import gymnasium
+    import pettingzoo
+
+    gymnasium.register(
+        "Wildfire-v0",
+        entry_point="warp_torchrl.api.adapters:FireExtinguishingEnv",
+        vector_entry_point="warp_torchrl.api.adapters:FireExtinguishingVectorEnv",
+    )
+    if hasattr(pettingzoo, "register"):  # older ones have no registry
+        pettingzoo.register("parallel", "Wildfire-v0", entry_point="warp_torchrl.api.adapters:parallel_env")
+        pettingzoo.register("aec", "Wildfire-v0", entry_point="warp_torchrl.api.adapters.pettingzoo:env")
+
+
+if not is_command():  # which does so after its first look
+    register_environments()
 
 __version__ = "0.1.0"
 _PLACES = {

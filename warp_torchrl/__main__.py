@@ -3,6 +3,7 @@
 import sys
 from importlib import import_module
 
+from warp_torchrl import register_environments
 from warp_torchrl.system.exit_codes import DONE, MISTAKE
 from warp_torchrl.system.foreign_text import plain_text
 from warp_torchrl.validation import did_you_mean
@@ -47,6 +48,7 @@ def run(name: str) -> int:
     """Run a command with the arguments of the process, and return its exit code; mistakes are told before imports."""
     if name in _LOOKED_AT:
         import_module("warp_torchrl.commands.first_look").first_look(name, sys.argv[1:])
+    register_environments()
     module, _, function = COMMANDS[name][0].partition(":")
     return getattr(import_module(module), function)() or DONE
 
