@@ -1,6 +1,8 @@
 """Evaluate: ``python evaluate.py checkpoint=RUN``, or ``policy=local scenario=default``. See ``conf/evaluate.yaml``."""
 
-from warp_torchrl.commands.command import evaluate
+import sys
+
+from warp_torchrl.__main__ import run
 
 if __name__ == "__main__":
-    evaluate()
+    sys.exit(run("evaluate"))

@@ -1,6 +1,8 @@
 """Train a team: ``python train.py [key=value ...]``, ``python train.py -m key=a,b`` sweeps. See ``conf/train.yaml``."""
 
-from warp_torchrl.commands.command import train
+import sys
+
+from warp_torchrl.__main__ import run
 
 if __name__ == "__main__":
-    train()
+    sys.exit(run("train"))

@@ -217,6 +217,7 @@ def test_adapters_are_views_that_nothing_needs():
                     "runs/config/files",
                     "runs/config/grammar",
                     "runs/config/plugins",
+                    "runs/config/registration",
                     "runs/config/saved_config",
                     "runs/config/space",
                 ),

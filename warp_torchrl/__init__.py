@@ -21,9 +21,6 @@ if "OMP_WAIT_POLICY" not in os.environ:
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import gymnasium
-import pettingzoo
-
 if TYPE_CHECKING:
     from warp_torchrl.algorithms.off_policy import OffPolicy
     from warp_torchrl.algorithms.on_policy import OnPolicy
@@ -39,7 +36,7 @@ if TYPE_CHECKING:
     from warp_torchrl.models import Mlp
     from warp_torchrl.prediction.predict import predict
     from warp_torchrl.prediction.simulation import fire_history, simulate
-    from warp_torchrl.runs.config.plugins import add_scenario, register
+    from warp_torchrl.runs.config.registration import add_scenario, register
     from warp_torchrl.runs.policies.load import load_policy
     from warp_torchrl.world.air.wind import Uniform
     from warp_torchrl.world.behaviour.rate_of_spread import rate_of_spread
@@ -48,14 +45,24 @@ if TYPE_CHECKING:
     from warp_torchrl.world.state.state import Transition, WorldState
     from warp_torchrl.world.terrain.array import Array
 
-gymnasium.register(
-    "Wildfire-v0",
-    entry_point="warp_torchrl.api.adapters:FireExtinguishingEnv",
-    vector_entry_point="warp_torchrl.api.adapters:FireExtinguishingVectorEnv",
-)
-if hasattr(pettingzoo, "register"):  # older ones have no registry
-    pettingzoo.register("parallel", "Wildfire-v0", entry_point="warp_torchrl.api.adapters:parallel_env")
-    pettingzoo.register("aec", "Wildfire-v0", entry_point="warp_torchrl.api.adapters.pettingzoo:env")
+
+def register_environments() -> None:
+    """Let Gymnasium and PettingZoo make our environments by name."""
+    import gymnasium
+    import pettingzoo
+
+    gymnasium.register(
+        "Wildfire-v0",
+        entry_point="warp_torchrl.api.adapters:FireExtinguishingEnv",
+        vector_entry_point="warp_torchrl.api.adapters:FireExtinguishingVectorEnv",
+    )
+    if hasattr(pettingzoo, "register"):  # older ones have no registry
+        pettingzoo.register("parallel", "Wildfire-v0", entry_point="warp_torchrl.api.adapters:parallel_env")
+        pettingzoo.register("aec", "Wildfire-v0", entry_point="warp_torchrl.api.adapters.pettingzoo:env")
+
+
+if not is_command():  # which does so after its first look
+    register_environments()
 
 __version__ = "0.1.0"
 _PLACES = {
@@ -74,7 +81,7 @@ _PLACES = {
     "Uniform": "world.air.wind",
     "WildfireEnv": "env",
     "WorldState": "world.state.state",
-    "add_scenario": "runs.config.plugins",
+    "add_scenario": "runs.config.registration",
     "baselines": "api.names",
     "evaluate": "api.evaluate",
     "fire_history": "prediction.simulation",
@@ -82,7 +89,7 @@ _PLACES = {
     "make_env": "api.make",
     "predict": "prediction.predict",
     "rate_of_spread": "world.behaviour.rate_of_spread",
-    "register": "runs.config.plugins",
+    "register": "runs.config.registration",
     "scenarios": "api.names",
     "simulate": "prediction.simulation",
     "train": "api.train",

@@ -3,6 +3,7 @@
 import sys
 from importlib import import_module
 
+from warp_torchrl import register_environments
 from warp_torchrl.system.exit_codes import DONE, MISTAKE
 from warp_torchrl.system.foreign_text import plain_text
 from warp_torchrl.validation import did_you_mean
@@ -27,6 +28,7 @@ COMMANDS = {
     "benchmark": ("warp_torchrl.benchmark.__main__:main", "measure speed and difficulty on this machine"),
 }
 """Function and purpose of each command."""
+_LOOKED_AT = ("train", "evaluate", "predict")  # for mistakes, before the function is imported
 
 
 def main() -> int:
@@ -40,8 +42,16 @@ def main() -> int:
         hint = did_you_mean(name, COMMANDS)
         print(f"error: the command must be one of {known}, got {plain_text(name)}{hint}", file=sys.stderr)
         return MISTAKE
-    module, _, function = COMMANDS[name][0].partition(":")
     sys.argv = [sys.argv[0], *rest]
+    return run(name)
+
+
+def run(name: str) -> int:
+    """Run a command with the arguments of the process, and return its exit code; mistakes are told before imports."""
+    if name in _LOOKED_AT:
+        import_module("warp_torchrl.commands.first_look").first_look(name, sys.argv[1:])
+    register_environments()
+    module, _, function = COMMANDS[name][0].partition(":")
     return getattr(import_module(module), function)() or DONE
 
 

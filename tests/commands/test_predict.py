@@ -9,7 +9,8 @@ import yaml
 from PIL import Image
 
 from tests.world.rasters import rasterio, read, write
-from warp_torchrl.commands.predict import composed, main
+from warp_torchrl.commands.predict import main
+from warp_torchrl.runs.config.prediction import compose_prediction
 from warp_torchrl.world.terrain.layer import read_grid
 
 FIRES = Path(__file__).parents[3] / "shared" / "fires"
@@ -203,12 +204,12 @@ def test_a_folder_that_holds_something_is_left_alone(folder, capsys):
 def test_help_names_every_option(capsys):
     assert main(["--help"]) == 0
     said = capsys.readouterr().out
-    ours = [name for name in composed([]) if name not in ("landscape", "fire")]
+    ours = [name for name in compose_prediction([]) if name not in ("landscape", "fire")]
     assert all(f"\n  {name}=" in said or f"\n  {name}." in said for name in ours)
 
 
 def test_a_configuration_shows_every_value():
-    assert yaml.safe_dump(composed(["hours=3"])) and composed(["hours=3"])["hours"] == 3
+    assert yaml.safe_dump(compose_prediction(["hours=3"])) and compose_prediction(["hours=3"])["hours"] == 3
 
 
 @pytest.mark.skipif(not FIRES.is_dir(), reason=f"the shared fires are not at {FIRES}")

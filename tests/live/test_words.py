@@ -27,6 +27,7 @@ def test_the_headline_tells_the_step_of_the_side_that_is_farthest(match):
 
 def test_the_table_has_a_row_for_each_side_with_its_numbers(match):
     rows = words.numbers_table(match).splitlines()
+    assert rows[0] == "| | \u2003saved | \u2003burning | \u2003put\u00a0out | \u2003cleared |", "heads are apart"
     assert [row.split(" | ")[0].strip("| ") for row in rows[2:]] == [
         "default &#40;4.0 M&#41;",
         "local",

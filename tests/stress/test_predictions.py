@@ -13,6 +13,7 @@ from warp_torchrl.commands.predict import OUTPUTS, REPORT
 from warp_torchrl.prediction.case import read_case
 from warp_torchrl.runs import output
 from warp_torchrl.runs.config.options import PredictionOptions
+from warp_torchrl.runs.config.prediction import compose_prediction
 from warp_torchrl.runs.output import DRAFT, output_folder
 from warp_torchrl.system import disk
 
@@ -28,7 +29,7 @@ def predicted(tmp_path_factory):
     (folder / "weather.csv").write_text("WS,WD,FFMC\n10.8,270,90\n")
     (folder / "ignition.csv").write_text("row,column\n10,10\n")
     layers = ["landscape.fuel=fuel.tif", "landscape.elevation=elevation.tif", "landscape.table=fbp", "fire.model=fbp"]
-    values = command.composed([f"landscape.path={folder}", *layers])
+    values = compose_prediction([f"landscape.path={folder}", *layers])
     given = {"weather": str(folder / "weather.csv"), "ignition": str(folder / "ignition.csv"), "fires": 1}
     options = {number: PredictionOptions(**given, animation=number == 1) for number in (1, 2, 3)}
     case = read_case(command._landscape(values["landscape"]), command._law(values["fire"]), options[2])

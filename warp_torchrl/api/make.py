@@ -7,7 +7,8 @@ import torch
 
 from warp_torchrl.api.keywords import as_overrides, check_list
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.runs.config.construction import ENVIRONMENT, build_components
+from warp_torchrl.runs.config.components import build_components
+from warp_torchrl.runs.config.construction import ENVIRONMENT
 from warp_torchrl.runs.config.environment import compose_environment
 from warp_torchrl.runs.config.grammar import listed_plugins
 from warp_torchrl.runs.config.plugins import Plugin, load

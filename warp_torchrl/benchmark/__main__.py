@@ -1,8 +1,8 @@
 """Speed, calibration of scenarios and checks of fires: ``warp benchmark WHAT``.
 
-WHAT is tick, env, train, scaling, tasks, attack, rewards, generalist, fires, ellipses, predict, twins, witness or
-beliefs; several run one after the other. gpu runs alone: it measures everything on a card in under five minutes, and
-writes it to a file.
+WHAT is tick, env, train, scaling, processes, tasks, attack, rewards, generalist, fires, ellipses, predict, twins,
+witness or beliefs; several run one after the other. gpu runs alone: it measures everything on a card in under five
+minutes, and writes it to a file.
 """
 
 import argparse
@@ -27,6 +27,7 @@ from warp_torchrl.benchmark.gpu import SMALL, Size, measure_gpu
 from warp_torchrl.benchmark.growth_figure import draw_growth
 from warp_torchrl.benchmark.machine import header, machine, peak_memory
 from warp_torchrl.benchmark.predictions import prediction_costs, prediction_table
+from warp_torchrl.benchmark.processes import cores, process_scaling, process_table
 from warp_torchrl.benchmark.scaling import growth, growth_table
 from warp_torchrl.benchmark.shares import share_table
 from warp_torchrl.benchmark.tasks import (
@@ -106,6 +107,13 @@ def _scaling(options: Namespace) -> dict[str, Rows]:
     return {"scaling": rows}
 
 
+def _processes(options: Namespace) -> dict[str, Rows]:
+    rows = []
+    for name in options.scenario or ["default"]:
+        rows += process_scaling([f"scenario={name}", *options.set], _worlds(options), cores(), options.repeats)
+    return {"processes": rows}
+
+
 def _tasks(options: Namespace) -> dict[str, Rows]:
     names = options.scenario or SCENARIOS
     if options.policies is not None:
@@ -183,6 +191,7 @@ _MEASURES = {
     "env": _env,
     "train": _train,
     "scaling": _scaling,
+    "processes": _processes,
     "tasks": _tasks,
     "attack": _attack,
     "rewards": _rewards,
@@ -200,6 +209,7 @@ _TABLES = {
     "train": rate_table,
     "profile": share_table,
     "scaling": growth_table,
+    "processes": process_table,
     "tasks": task_table,
     "pairs": pair_table,
     "attack": attack_table,

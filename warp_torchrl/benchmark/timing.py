@@ -10,12 +10,14 @@ from typing import Any
 
 import torch
 
+from warp_torchrl.algorithms import parallel
+
 Timer = Callable[[], float]
 
 
 def is_alone(device: str) -> bool:
-    """Return whether all work happens on one thread of the processor."""
-    return device == "cpu" and torch.get_num_threads() == 1
+    """Return whether all work happens on one thread of one process."""
+    return device == "cpu" and torch.get_num_threads() == 1 and parallel.size() == 1
 
 
 def clock(device: str) -> Timer:

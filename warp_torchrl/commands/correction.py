@@ -13,7 +13,8 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.heuristics import HEURISTICS, idle_action
 from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
-from warp_torchrl.runs.config.construction import ENVIRONMENT, ConfigError, build_components
+from warp_torchrl.runs.config.components import build_components
+from warp_torchrl.runs.config.construction import ENVIRONMENT, ConfigError
 from warp_torchrl.runs.config.saved_config import environment_config
 from warp_torchrl.runs.config.seeds import SEEDS, WORLDS, first_world_seed
 from warp_torchrl.runs.history import trained_steps

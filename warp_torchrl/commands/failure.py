@@ -11,14 +11,13 @@ from warp_torchrl.runs.config.compose import HYDRA_ERRORS, one_line
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.system.checksummed import Unsound
 from warp_torchrl.system.exit_codes import DISK, DONE, IN_USE, MISTAKE, NUMERICAL, UNSOUND
-from warp_torchrl.system.foreign_text import plain_text
+from warp_torchrl.system.foreign_text import error_line
 from warp_torchrl.system.interruption import SIGNALED
 from warp_torchrl.system.lock import RunFolderInUse
 from warp_torchrl.system.signals import Stopped, left_by
 from warp_torchrl.training.finite import NumericalFailure
 
 __all__ = ["DISK", "DONE", "IN_USE", "MISTAKE", "NUMERICAL", "UNSOUND", "fail"]
-_LONGEST = 4000  # characters of a line
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
 
@@ -32,9 +31,9 @@ def fail(error: Exception, debug: bool) -> tuple[int, str]:
     if debug:
         traceback.print_exc()
     code, line = _diagnose(error)
-    line = plain_text(line, _LONGEST)  # it may quote what others wrote
-    print(f"error: {line}", file=sys.stderr, flush=True)
-    return code, line
+    line = error_line(line)
+    print(line, file=sys.stderr, flush=True)
+    return code, line.removeprefix("error: ")
 
 
 def _diagnose(error: Exception) -> tuple[int, str]:

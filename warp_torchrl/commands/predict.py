@@ -38,10 +38,10 @@ from warp_torchrl.prediction.observed.report import (
 from warp_torchrl.prediction.observed.scene import Scene
 from warp_torchrl.prediction.predict import Prediction, lasting, predict
 from warp_torchrl.prediction.report import page, report_numbers, warnings
-from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
+from warp_torchrl.runs.config.compose import without_targets
 from warp_torchrl.runs.config.construction import ConfigError, build, construct
-from warp_torchrl.runs.config.grammar import check_flags
 from warp_torchrl.runs.config.options import PredictionOptions
+from warp_torchrl.runs.config.prediction import compose_prediction
 from warp_torchrl.runs.output import output_folder
 from warp_torchrl.system import disk, memory
 from warp_torchrl.system.provenance import Provenance, gathered
@@ -72,25 +72,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return run_program(arguments, about, _run)
 
 
-def composed(overrides: Sequence[str]) -> dict[str, Any]:
-    """Compose ``conf/predict.yaml`` with overrides, as plain values.
-
-    ``ignition`` and ``wind`` are values here, and groups of classes in Hydra's files, so they are read apart.
-
-    Raises:
-        ConfigError: If an override does not fit, in one line.
-    """
-    check_flags(overrides)
-    apart = [each for each in overrides if each.startswith(("ignition=", "wind="))]
-    values = plain(compose_config("predict", [each for each in overrides if each not in apart]))
-    named = (each.partition("=") for each in apart)
-    return values | {key: value.strip("'\"") for key, _, value in named}
-
-
 def _run(arguments: Sequence[str]) -> None:
     began, program = time.perf_counter(), memory.most_used()
     logging.basicConfig(level=logging.INFO, format="%(message)s")
-    values = composed(arguments)
+    values = compose_prediction(arguments)
     options: PredictionOptions = construct(
         PredictionOptions, {key: value for key, value in values.items() if key not in _APART}, ""
     )

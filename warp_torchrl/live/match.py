@@ -16,7 +16,8 @@ from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.live.crew import Question, Refused
 from warp_torchrl.live.player import Player, player_of
 from warp_torchrl.live.side import Side
-from warp_torchrl.runs.config.construction import ENVIRONMENT, build_components
+from warp_torchrl.runs.config.components import build_components
+from warp_torchrl.runs.config.construction import ENVIRONMENT
 from warp_torchrl.runs.config.saved_config import environment_config
 from warp_torchrl.runs.config.seeds import FIRST_EVALUATED
 from warp_torchrl.runs.policies.named_policy import NamedPolicy

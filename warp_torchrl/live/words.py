@@ -17,6 +17,7 @@ from warp_torchrl.system.foreign_text import escaped_markdown as escaped
 from warp_torchrl.system.foreign_text import plain_text
 
 _LISTED = 15  # recordings on the page
+_GAP, _NO_BREAK = "\u2003", "\u00a0"  # the page's tables have no room between columns of their own
 _STYLE = "font-family:inherit;font-size:12px;line-height:1.35"
 
 
@@ -30,12 +31,17 @@ def headline(match: Match) -> str:
 
 def numbers_table(match: Match) -> str:
     """Return the table of all sides: forest saved and burning, acts."""
-    rows = ["| | saved | burning | put out | cleared |", "|---|---:|---:|---:|---:|"]
+    rows = [f"| | {_heads('saved', 'burning', 'put out', 'cleared')} |", "|---|---:|---:|---:|---:|"]
     for side in match.everywhere:
         curves = side.curves
         acts = f"{int(curves.extinguished.sum())} | {int(curves.cleared.sum())}" if side is not match.alone else " | "
         rows.append(f"| {escaped(title(side))} | **{curves.saved[-1]:.1%}** | {curves.burning[-1]:.1%} | {acts} |")
     return "\n".join(rows)
+
+
+def _heads(*names: str) -> str:
+    """Return the heads of columns of numbers, apart and in one line."""
+    return " | ".join(f"{_GAP}{name.replace(' ', _NO_BREAK)}" for name in names)
 
 
 def title(side: Side) -> str:
@@ -97,11 +103,11 @@ def acts(side: Side) -> str:
     """Return the table of a team's vehicles: the mover of each, its water, and its acts."""
     curves, tank = side.curves, side.state.vehicles.tank[0].tolist()
     full = side.env.world.team.tank
-    rows = ["| vehicle | moved by | put out | cleared | water |", "|---|---|---:|---:|---:|"]
+    rows = [f"| vehicle | moved by | {_heads('put out', 'cleared', 'water')} |", "|---|---|---:|---:|---:|"]
     for agent, name in enumerate(side.env.agent_names):
         water = "" if full is None else f"{tank[agent]} of {full}"
         done = f"{int(curves.extinguished[agent])} | {int(curves.cleared[agent])}"
-        rows.append(f"| {escaped(name)} | {moved_by(side, agent)} | {done} | {water} |")
+        rows.append(f"| {escaped(name)}{_GAP} | {moved_by(side, agent)} | {done} | {water} |")
     return "\n".join(rows)
 
 

@@ -8,6 +8,7 @@ import unicodedata
 
 MOST = 300
 """Length of a text that is shown in one line, where no other is given [characters]."""
+_MOST_OF_ERROR = 4000
 _READ = 8  # characters for each that is shown
 _SEQUENCE = re.compile(
     r"(?:\x1b\[|\x9b)[0-?]*[ -/]*[@-~]?"  # ECMA-48 control sequences: colours, movements of the cursor
@@ -53,3 +54,8 @@ def escaped_markdown(value: object, most: int = MOST) -> str:
     """
     line = _LINK.sub(_JOINER, plain_text(str(value), most))
     return _MARKUP.sub(lambda found: f"&#{ord(found[0])};", line)
+
+
+def error_line(text: str) -> str:
+    """Return the last line of a failed command; the text may quote what others wrote."""
+    return f"error: {plain_text(' '.join(text.split()), _MOST_OF_ERROR)}"

@@ -9,12 +9,12 @@ from typing import TypeVar
 import torch
 from torch import Tensor
 
-from warp_torchrl.validation import check_fields
 from warp_torchrl.world.air.wind import Uniform, Wind
 from warp_torchrl.world.arrays.batch import concatenated
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.backends import backend
 from warp_torchrl.world.backends.tick import advance, initial_state
+from warp_torchrl.world.episode_rules import EpisodeRules
 from warp_torchrl.world.ignition.ignition import Ignition, IgnitionSource
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.law.fire import Fire
@@ -35,7 +35,7 @@ _CELLS_AT_ONCE = {"cpu": 2**17, "cuda": 2**20}
 
 
 @dataclass(frozen=True, kw_only=True)
-class World:
+class World(EpisodeRules):
     """The rules of a scenario. It holds no state: ``reset`` makes one, ``step`` makes the next.
 
     Attributes:
@@ -48,13 +48,6 @@ class World:
         belief: What they believe beyond that.
         agencies: Whom the vehicles serve.
         mechanics: What else holds in these worlds, see ``loop``.
-        steps_per_tick: Agent steps to a fire tick.
-        horizon: Agent steps to an episode.
-        cell_size: Side of a cell [m]; None takes the landscape's own, 30 m where it has none.
-        action_masking: Whether agents are shown which actions would do something. Without it every mask is open, as
-            the paper has it: what would do nothing can be chosen, and does nothing.
-        goal: Name of the metric by which policies are compared; None: the trees saved, or the front watched where no
-            vehicle can act.
 
     Raises:
         ValueError: If a value is out of its range or the team does not fit on the map.
@@ -69,14 +62,9 @@ class World:
     belief: Belief = field(default_factory=Belief)
     agencies: Agencies = field(default_factory=OneAgency)
     mechanics: tuple[Mechanic, ...] = ()
-    steps_per_tick: int = 5
-    horizon: int = 256
-    cell_size: float | None = None
-    action_masking: bool = True
-    goal: str | None = None
 
     def __post_init__(self) -> None:
-        check_fields(self, steps_per_tick=(1, 1000), horizon=(1, 1_000_000), cell_size=(0.01, 100_000.0))
+        super().__post_init__()
         height, width = self.size
         unpaced = self.wind.over(self.landscape)  # refuses a wind that does not fit the landscape
         object.__setattr__(self, "fire", self.fire.over(self.landscape, unpaced, self.side_of_cell))

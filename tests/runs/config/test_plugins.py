@@ -14,7 +14,6 @@ from hydra.core.config_store import ConfigStore
 
 from warp_torchrl import load_policy, make_env, register
 from warp_torchrl.algorithms.dqn import Dqn
-from warp_torchrl.commands.predict import composed
 from warp_torchrl.commands.program import flag_arguments, run_program
 from warp_torchrl.env.metrics import METRICS
 from warp_torchrl.env.observation import CHANNELS
@@ -27,6 +26,7 @@ from warp_torchrl.runs.config import construction, plugins
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, conf_folder, option_names, plain, without_targets
 from warp_torchrl.runs.config.construction import ENVIRONMENT, WORLD_KEYS, ConfigError, build
+from warp_torchrl.runs.config.prediction import compose_prediction
 from warp_torchrl.runs.config.saved_config import SavedConfig, environment_config, restore, world_overrides
 from warp_torchrl.training.loop import Training
 
@@ -215,7 +215,7 @@ def test_commands_import_what_they_list(here, capsys):
     assert run_program(["plugins=[my_lab]", "policy=sentry"], "", lambda given: print(*given)) == 0
     assert capsys.readouterr().out == "plugins=[my_lab] policy=sentry\n" and "sentry" in HEURISTICS
     assert flag_arguments(["RUN", "plugins=[my_lab]", "--mode", "sampled"]) == ["RUN", "--mode", "sampled"]
-    assert composed(["plugins=[my_lab]"])["plugins"] == ["my_lab"]
+    assert compose_prediction(["plugins=[my_lab]"])["plugins"] == ["my_lab"]
     assert compose_config("calibrate", ["plugins=[my_lab]"]).plugins == ["my_lab"]
     assert run_program(["plugins=my_lab"], "", lambda given: None) == 2
     assert "plugins must be a list, plugins=[my_lab]" in capsys.readouterr().err

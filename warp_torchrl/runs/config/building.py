@@ -9,6 +9,7 @@ from typing import Any
 
 from warp_torchrl.collection.imitation import Imitation, check_teacher
 from warp_torchrl.collection.mixture import Kind, Mixture
+from warp_torchrl.runs.config.components import build_components
 from warp_torchrl.runs.config.compose import OPTION, compose_config, option_names, plain
 from warp_torchrl.runs.config.construction import (
     COMMAND_KEYS,
@@ -16,7 +17,6 @@ from warp_torchrl.runs.config.construction import (
     OF_WORLDS,
     WORLD_KEYS,
     ConfigError,
-    build_components,
     chosen,
     construct,
 )

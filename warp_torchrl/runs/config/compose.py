@@ -7,6 +7,7 @@ this package's own or of a plug-in's; nothing that is read from a run folder is 
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import fields
 from functools import lru_cache
@@ -21,7 +22,13 @@ from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
 
-from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError, UnknownKeyError, component
+from warp_torchrl.runs.config.construction import (
+    COMPONENTS,
+    ConfigError,
+    UnknownKeyError,
+    by_excerpts,
+    component,
+)
 from warp_torchrl.runs.config.defaults import defaults
 from warp_torchrl.runs.config.files import FileConfigSource
 from warp_torchrl.runs.config.grammar import check_overrides, several_values
@@ -48,12 +55,35 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
         ConfigError: If an override does not fit, in one line.
     """
     check_choices(overrides)
+    return composed(name, overrides)
+
+
+def composed(name: str, overrides: Sequence[str]) -> DictConfig:
+    """Compose as ``compose_config`` does, without its check that each group has one option.
+
+    Raises:
+        ConfigError: If an override does not fit, in one line.
+    """
     config = _compose(name, overrides)
     try:
         OmegaConf.resolve(config)
     except OmegaConfBaseException as error:
         raise ConfigError(one_line(error)) from None
     return config
+
+
+@contextmanager
+def without_libraries() -> Iterator[None]:
+    """Compose and construct by excerpts of modules, within milliseconds, and forget afterwards what was composed.
+
+    Defaults that no excerpt has are missing, and what needs one raises ``OutOfReachError``.
+    """
+    try:
+        with by_excerpts():
+            yield
+    finally:
+        _composed.cache_clear()
+        FileConfigSource.forget()
 
 
 def choices(overrides: Sequence[str]) -> dict[str, str]:

@@ -6,16 +6,15 @@ else is ever imported by name.
 
 import importlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import MISSING, fields, is_dataclass
 from inspect import isabstract
-from typing import Any, get_origin, get_type_hints
+from typing import Any, cast, get_origin, get_type_hints
 
-from warp_torchrl.env.metrics import chosen_goal
+from warp_torchrl.system.excerpt import excerpt
 from warp_torchrl.validation import did_you_mean, fit
-from warp_torchrl.world.mechanics.mechanic import Mechanic
-from warp_torchrl.world.mechanics.table import mechanics
-from warp_torchrl.world.world import World
 
 OF_WORLDS = ("landscape", "wind", "fire", "team", "ignition", "sensing", "belief", "agencies")
 """Groups whose options make a world."""
@@ -28,6 +27,7 @@ WORLD_KEYS = ("scenario", *OF_WORLDS, "mechanics", "steps_per_tick", "horizon", 
 COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite", "maps", "maps_fires", "picture")
 """What the commands read themselves."""
 _ADDED: dict[str, type] = {}
+_BY_EXCERPTS = ContextVar("by_excerpts", default=False)
 
 
 class ConfigError(ValueError):
@@ -86,6 +86,8 @@ def component(target: object) -> type | None:
     module, _, name = str(target).rpartition(".")
     if not re.fullmatch(r"warp_torchrl(\.\w+)*", module):
         return None
+    if _BY_EXCERPTS.get():
+        return cast("type", excerpt(module, name))
     try:
         found = getattr(importlib.import_module(module), name, None)
     except ModuleNotFoundError as error:
@@ -93,6 +95,16 @@ def component(target: object) -> type | None:
             raise
         return None
     return found if isinstance(found, type) and is_dataclass(found) else None
+
+
+@contextmanager
+def by_excerpts() -> Iterator[None]:
+    """Find the components of this package by excerpts of their modules, which import no library."""
+    token = _BY_EXCERPTS.set(True)
+    try:
+        yield
+    finally:
+        _BY_EXCERPTS.reset(token)
 
 
 def free_mappings(kind: type) -> set[str]:
@@ -138,45 +150,6 @@ def _made(value: Any, hint: Any, key: str, prefix: str) -> Any:
     if isinstance(hint, type) and is_dataclass(hint) and not isabstract(hint) and not is_dataclass(value):
         return construct(hint, value, f"{prefix}{key}")
     return fit(value, hint, key)
-
-
-def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENTS) -> dict[str, Any]:
-    """Build components of a composed configuration, and the ``world`` of those that make one.
-
-    Args:
-        config: As plain values.
-        names: Which; those of the world must be among them.
-
-    Raises:
-        ConfigError: With key, value and rule.
-    """
-    first = ("model",) if "model" in names else ()  # whose messages are the team's: mistakes are told of the model
-    built = {name: build(config[name], name) for name in dict.fromkeys((*first, *names))}
-    built["mechanics"] = build_mechanics(config.get("mechanics", {}))
-    world = construct(World, chosen(World, {**config, **built}), "")
-    try:
-        chosen_goal(world)
-        if "reward" in built:
-            built["reward"].check_world(world)
-    except ValueError as error:
-        raise ConfigError(str(error)) from None
-    return {**built, "world": world}
-
-
-def build_mechanics(values: object) -> tuple[Mechanic, ...]:
-    """Build the mechanics of a world from their values by name; a mechanic without values has its defaults.
-
-    Raises:
-        ConfigError: With key, value and rule.
-    """
-    if not isinstance(values, Mapping):
-        raise ConfigError(f"mechanics must be a mapping, got {values!r}")
-    known = mechanics()
-    for name in values:
-        if name not in known:
-            hint = did_you_mean(name, known)
-            raise ConfigError(f"mechanics must be some of {', '.join(known)}, got {name}{hint}")
-    return tuple(construct(known[name], own or {}, f"mechanics.{name}") for name, own in values.items())
 
 
 def chosen(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:

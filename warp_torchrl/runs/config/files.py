@@ -5,6 +5,7 @@ filled in. So ``--cfg job`` shows every value, every field can be overridden, an
 """
 
 import re
+from collections.abc import Sequence
 from copy import deepcopy
 from pathlib import Path
 from typing import Any, ClassVar, cast
@@ -15,10 +16,15 @@ from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError, component
 from warp_torchrl.runs.config.defaults import defaults, open_mappings
-from warp_torchrl.runs.config.options import PredictionOptions, SearchOptions
 from warp_torchrl.system.foreign_yaml import read_yaml
-from warp_torchrl.world.world import World
 
+RUN = "warp_torchrl.runs.config.run_config.RunConfig"
+"""The class of a run's values; it imports all learners, which worlds do without."""
+WORLD = "warp_torchrl.world.world.World"
+"""That of a world's."""
+PREDICTION = "warp_torchrl.runs.config.options.PredictionOptions"
+"""That of a prediction's."""
+_SEARCH = "warp_torchrl.runs.config.options.SearchOptions"
 _RESOLVER = re.compile(r"\$\{[^{}]*:")
 
 
@@ -41,6 +47,11 @@ class FileConfigSource(file_config_source.FileConfigSource):
         if state not in self._filled:
             self._filled[state] = self._read(config_path)
         return deepcopy(self._filled[state])
+
+    @classmethod
+    def forget(cls) -> None:
+        """Forget what it has read."""
+        cls._filled.clear()
 
     def _read(self, config_path: str) -> ConfigResult:
         path = Path(self.path, self._normalize_file_name(config_path))
@@ -73,19 +84,19 @@ def _left_out(config_path: str, node: DictConfig) -> dict[str, Any]:
     """Return the default values of what a yaml file configures."""
     name = config_path.removesuffix(".yaml")
     if name == "predict":
-        return defaults(PredictionOptions)
+        return _defaults(PREDICTION, left_out=())
     if name == "search":
-        return {"search": defaults(SearchOptions)}
-    if name == "worlds":
-        return {key: value for key, value in {**defaults(World), "mechanics": {}}.items() if key not in COMPONENTS}
-    if name == "train":
-        from warp_torchrl.runs.config.run_config import RunConfig  # and with it all learners, which worlds do without
-
-        run = {**defaults(World), "mechanics": {}, **defaults(RunConfig)}
-        return {key: value for key, value in run.items() if key not in COMPONENTS}
+        return {"search": _defaults(_SEARCH)}
+    if name in ("worlds", "train"):
+        return {**_defaults(WORLD), "mechanics": {}, **(_defaults(RUN) if name == "train" else {})}
     kind = component(node["_target_"]) if "_target_" in node else None
     if kind is None:
         return {}
     # A file that builds on another leaves to that one what its class inherits.
     own = kind.__annotations__ if "defaults" in node else defaults(kind)
     return {"_target_": node["_target_"], **{name: value for name, value in defaults(kind).items() if name in own}}
+
+
+def _defaults(target: str, left_out: Sequence[str] = COMPONENTS) -> dict[str, Any]:
+    kind = component(target)
+    return {} if kind is None else defaults(kind, left_out)

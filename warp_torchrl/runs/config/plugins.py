@@ -6,49 +6,23 @@ The command line, a caller and installed entry points name the modules to import
 import importlib
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, fields, is_dataclass
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeVar, cast
+from typing import Any
 
 from hydra.core.config_search_path import ConfigSearchPath
-from hydra.core.config_store import ConfigStore
-from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.plugins import Plugins
 from hydra.plugins.search_path_plugin import SearchPathPlugin
-from omegaconf import OmegaConf
 
-from warp_torchrl.env.metrics import metric
-from warp_torchrl.env.observation import channel, number, picture_channel, state_plane
-from warp_torchrl.env.reward.terms import term
-from warp_torchrl.heuristics import heuristic
-from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError, add_component
-from warp_torchrl.runs.config.defaults import option_node
-from warp_torchrl.runs.config.grammar import check_overrides
-from warp_torchrl.validation import did_you_mean
-from warp_torchrl.world.mechanics.table import mechanic
-from warp_torchrl.world.team.abilities import ability
+from warp_torchrl.runs.config.construction import ConfigError
 
-Added = TypeVar("Added", bound=Callable[..., Any])
 Plugin = str | ModuleType
 """A plug-in, or its name."""
 ENTRY_POINTS = "warp_torchrl.plugins"
 """Group of the entry points by which installed packages are plug-ins."""
-_NAMED: dict[str, Callable[..., Any]] = {"heuristic": heuristic, "mechanic": mechanic, "term": term, "ability": ability}
-"""Tables whose rows have a name that is given."""
-_FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "channel": channel,
-    "number": number,
-    "picture_channel": picture_channel,
-    "state_plane": state_plane,
-    "metric": metric,
-}
-"""Tables whose rows have the name of their function."""
-KINDS = (*COMPONENTS, *_NAMED, *_FUNCTIONS)
-"""What ``register`` takes."""
 _MODULE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _LOADED: list[str] = []
 _FOLDERS: dict[str, Path] = {}
@@ -79,104 +53,39 @@ def changes() -> int:
     return len(_CHANGES)
 
 
-# What a plug-in calls
+# What plug-ins have added
 
 
-def register(kind: str, name: str | None = None, **options: Any) -> Callable[[Added], Added]:
-    """Return what adds a class or function of a plug-in under a name.
-
-        @register("reward")
-        @dataclass(frozen=True, kw_only=True)
-        class CalmFire(Reward):  # then reward=calm_fire chooses it, and reward.KEY=VALUE sets its fields
+def add_option(group: str, name: str, module: str, target: str = "") -> None:
+    """Record an option that a module adds; the module that has added it may do so again.
 
     Args:
-        kind: A group of the configuration, ``reward``, ``wind``, ``fire``, ``algorithm`` ...; or ``heuristic``,
-            ``mechanic``, ``term``, ``ability``, ``channel``, ``number``, ``picture_channel``, ``state_plane``,
-            ``metric``, a table of functions or classes.
-        name: Of the option or the row; None: the class's in snake case, or the function's.
-        options: Of a function's row, ``high=250`` of a channel.
+        group: ``reward``, ``scenario`` ...
+        name: Of the option.
+        module: Its module.
+        target: Path of its class; empty for a scenario.
 
     Raises:
-        ValueError: If the kind is unknown, the name is taken, or it is no frozen dataclass where it should be.
-    """
-    if kind not in KINDS:
-        raise ValueError(f"kind must be one of {', '.join(KINDS)}, got {kind!r}{did_you_mean(kind, KINDS)}")
-    if options and kind not in _FUNCTIONS:
-        raise ValueError(f"{kind} takes no options, got {', '.join(options)}")
-
-    def add(made: Added) -> Added:
-        called = name or (_snake(made.__name__) if isinstance(made, type) else made.__name__)
-        if kind in COMPONENTS:
-            _add_option(kind, called, made)
-        elif kind in _NAMED:
-            _NAMED[kind](called)(made)
-        elif name in (None, made.__name__):
-            _FUNCTIONS[kind](**options)(made)
-        else:
-            raise ValueError(f"{kind} must have the name of its function, {made.__name__}, got {name}")
-        _own(_path(made) if kind in COMPONENTS else called, made.__module__)
-        return made
-
-    return add
-
-
-def add_scenario(name: str, overrides: Sequence[str]) -> None:
-    """Add a scenario that differs from the defaults of worlds by overrides in the command line's grammar.
-
-        add_scenario("ridge", ["wind=gusts", "wind.speed=8", "landscape.size=24", "team.n_agents=3"])
-
-    Raises:
-        ConfigError: If an override cannot be read.
         ValueError: If the name is taken.
     """
-    module = sys._getframe(1).f_globals["__name__"]
-    check_overrides(overrides)
-    chosen, node = [], OmegaConf.create({"scenario": name})
-    for each in OverridesParser.create().parse_overrides(list(overrides)):
-        if each.key_or_group in COMPONENTS:
-            chosen.append({f"override /{each.key_or_group}": each.value()})
-        else:
-            OmegaConf.update(node, each.key_or_group, each.value(), force_add=True)
-    _check_new("scenario", name, _OWNERS.get(f"scenario={name}") == module)
-    own = cast("dict[str, Any]", OmegaConf.to_container(node))
-    values = {**({"defaults": chosen} if chosen else {}), **own}
-    ConfigStore.instance().store(name, values, group="scenario", package="_global_", provider=module)
-    _OPTIONS.setdefault("scenario", {})[name] = ""
-    _own(f"scenario={name}", module)
+    owner = _OWNERS.get(registered(group).get(name) or f"{group}={name}")
+    _check_new(group, name, is_again=owner == module)
+    _OPTIONS.setdefault(group, {})[name] = target
 
 
-def _add_option(group: str, name: str, kind: Any) -> None:
-    if not (isinstance(kind, type) and is_dataclass(kind) and kind.__dataclass_params__.frozen):  # type: ignore[attr-defined]
-        raise ValueError(f"{group} must be a frozen dataclass, got {kind!r}")
-    for each in fields(kind):
-        if each.init and each.default is MISSING and each.default_factory is MISSING:
-            raise ValueError(f"{group} must have a default for every field, and {kind.__name__}.{each.name} has none")
-    _check_new(group, name, _OWNERS.get(registered(group).get(name, "")) == kind.__module__)
-    add_component(_path(kind), kind)
-    ConfigStore.instance().store(name, option_node(kind), group=group, provider=kind.__module__)
-    _OPTIONS.setdefault(group, {})[name] = _path(kind)
+def own(text: str, module: str) -> None:
+    """Record the module of what configurations name by a text."""
+    _OWNERS[text] = module
+    _CHANGES.append(text)
 
 
 def _check_new(group: str, name: str, is_again: bool) -> None:
-    """Check that no option has a name; the module that has registered it may do so again."""
+    """Check that no option has a name, but where it is added again."""
     folders = (conf_folder(), *conf_folders())
     if any((folder / group / f"{name}.yaml").exists() for folder in folders) or (
         name in registered(group) and not is_again
     ):
         raise ValueError(f"{group}={name} must have a new name: there is one")
-
-
-def _path(kind: Any) -> str:
-    return f"{kind.__module__}.{kind.__qualname__}"
-
-
-def _snake(name: str) -> str:
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
-
-
-def _own(text: str, module: str) -> None:
-    _OWNERS[text] = module
-    _CHANGES.append(text)
 
 
 # Who names plug-ins

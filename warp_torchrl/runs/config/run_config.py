@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import torch
 
@@ -16,15 +16,15 @@ from warp_torchrl.env import LeveledEnv, WildfireEnv
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.options import CheckpointConfig, EvaluationConfig
 from warp_torchrl.runs.config.plugins import load
-from warp_torchrl.runs.config.seeds import MOST_WORLDS, SEEDS, first_world_seed
+from warp_torchrl.runs.config.run_numbers import RunNumbers
+from warp_torchrl.runs.config.seeds import first_world_seed
 from warp_torchrl.runs.config.worlds import KindOfWorld, check_alike, check_kinds
 from warp_torchrl.system.compiler import check_compiler
-from warp_torchrl.validation import check_fields
 from warp_torchrl.world.world import World
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunConfig:
+class RunConfig(RunNumbers):
     """Everything that a run needs, checked: the components, built, and the run's own numbers.
 
     Attributes:
@@ -40,18 +40,9 @@ class RunConfig:
         mixture: Which kinds of worlds a training plays.
         make_kinds: Returns the kinds, built.
         logger: The tracker, beside ``metrics.csv``.
-        n_worlds: Worlds in the batch.
-        total_frames: World steps in all; agent steps are frames x agents.
-        seed: 0 to 2^31; no world of one is a world of another, or of an evaluation.
-        device: ``cpu``, ``cuda`` or ``cuda:<number>``.
-        processes: Processes that learn together, each from an equal share of the worlds; ``auto`` takes what
-            ``parallel.automatic`` finds.
-        graph: Record each step of the worlds, and each of the optimiser, as one CUDA graph.
-        compile: Fuse steps and losses of training with ``torch.compile``: faster after a minute or two.
         checkpoint: When training saves.
         evaluation: How policies are evaluated.
         imitation: Whom a team learns from beside its rewards.
-        plugins: Modules of the user's own whose components it has; see ``warp_torchrl.runs.config.plugins``.
 
     Raises:
         ValueError: If a value is out of its range.
@@ -69,27 +60,12 @@ class RunConfig:
     mixture: Any
     make_kinds: Any = field(compare=False)
     logger: Any
-    n_worlds: int = 256
-    total_frames: int = 2_000_000
-    seed: int = 0
-    device: str = "cpu"
-    processes: int | Literal["auto"] = "auto"
-    compile: bool = False
-    graph: bool = False
     checkpoint: CheckpointConfig = field(default_factory=CheckpointConfig)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
     imitation: Imitation = field(default_factory=Imitation)
-    plugins: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        check_fields(self)
-        if not 1 <= self.n_worlds <= MOST_WORLDS:
-            raise ValueError(f"n_worlds must be in 1..{MOST_WORLDS}, got {self.n_worlds}")
-        if not 1 <= self.total_frames <= 10**15:
-            raise ValueError(f"total_frames must be in 1..1e15, got {self.total_frames}")
-        if not 0 <= self.seed <= SEEDS:
-            raise ValueError(f"seed must be in 0..{SEEDS}, got {self.seed}")
-        _check_device(self.device)
+        super().__post_init__()
         if self.processes != "auto":
             self._check_shares(self.processes)
 
@@ -252,16 +228,3 @@ class RunConfig:
             parts = {"observation": self.observation, "reward": self.reward, "device": self.device}
             return LeveledEnv(self.levels, n_worlds=n_worlds, seed=seed, **parts)
         return self.make_env(n_worlds, seed, fuse=self.compile, graph=self.graph, world=world)
-
-
-def _check_device(name: str) -> None:
-    try:
-        device = torch.device(name)
-    except RuntimeError:
-        raise ValueError(f"device must be cpu, cuda or cuda:<number>, got {name}") from None
-    if device.type not in ("cpu", "cuda"):
-        raise ValueError(f"device must be cpu, cuda or cuda:<number>, got {name}")
-    count = torch.cuda.device_count()
-    if device.type == "cuda" and (device.index or 0) >= count:
-        hint = "" if count else "; torch finds none here: choose device=cpu graph=false"
-        raise ValueError(f"device must be one of this machine's {count} CUDA devices, got {name}{hint}")

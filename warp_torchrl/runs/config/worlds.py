@@ -14,7 +14,8 @@ from warp_torchrl.env.observation import Observation
 from warp_torchrl.env.reward import Reward
 from warp_torchrl.env.specs import make_specs
 from warp_torchrl.models import differing, signature
-from warp_torchrl.runs.config.construction import ConfigError, build, build_mechanics, construct
+from warp_torchrl.runs.config.components import build_mechanics
+from warp_torchrl.runs.config.construction import ConfigError, build, construct
 from warp_torchrl.validation import did_you_mean, dotted
 from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.world import World
