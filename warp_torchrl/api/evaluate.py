@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from omegaconf import DictConfig
 from tensordict.nn import TensorDictModuleBase
 
 from warp_torchrl.api.keywords import as_overrides, check_list
@@ -65,8 +64,8 @@ def evaluate(
     load([*plugins, *listed_plugins(overrides)])
     further, objects = as_overrides(keywords)
     chosen = [] if scenario is None else [f"scenario={scenario}"]
-    config, found = composed_evaluation(policy, [*chosen, *overrides, *further])
-    values = {**plain(config), **objects}
+    composed, found = composed_evaluation(policy, [*chosen, *overrides, *further])
+    values = {**plain(composed), **objects}
     fires = map_fires({"maps": maps_fires is not None, "maps_fires": 1000 if maps_fires is None else maps_fires})
     kind = picture_kind({"picture": picture})
     config = run_config(values)
@@ -79,7 +78,7 @@ def evaluate(
     return evaluate_policy(config, path, found, worlds, fires, kind)
 
 
-def composed_evaluation(policy: Any, overrides: Sequence[str]) -> tuple[DictConfig, Any]:
+def composed_evaluation(policy: Any, overrides: Sequence[str]) -> tuple[Any, Any]:
     """Return the configuration of an evaluation, composed, and what plays: a name, a checkpoint or a policy.
 
     Args:

@@ -144,8 +144,9 @@ def test_a_belief_is_chosen_where_sight_is_limited(tmp_path) -> None:
     search = replace(search, rules=search.found_rules)
     board = Board(name="small", tasks={"one": SMALL.tasks["one"], "two": search})
     chosen = ("belief=ensemble", "belief.members=2", "belief.hidden=4")
-    known = [submit.play_board(board, [*board.tasks.values()], "oldest", "o", each, 1) for each in ((), chosen)]
-    assert [[played.knowledge for played in row.tasks.values()] for row in known] == [["alone", "alone"], ["alone", "team"]]
+    rows = [submit.play_board(board, [*board.tasks.values()], "oldest", "o", each, 1) for each in ((), chosen)]
+    known = [[played.knowledge for played in row.tasks.values()] for row in rows]
+    assert known == [["alone", "alone"], ["alone", "team"]]
 
 
 def test_other_rules_are_not_played(tmp_path) -> None:

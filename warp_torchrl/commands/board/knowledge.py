@@ -1,7 +1,7 @@
 """What the agents of a policy see and are told, in the words of the board."""
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Literal
 
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs.config.run_config import RunConfig

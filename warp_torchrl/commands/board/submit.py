@@ -126,9 +126,8 @@ def play_board(
     """
     for task in tasks:
         if task.found_rules != task.rules:
-            raise ConfigError(
-                f"{task.name}: this version plays other rules, {task.found_rules}, than {board.name} froze, {task.rules}"
-            )
+            rules = f"{task.found_rules}, than {board.name} froze, {task.rules}"
+            raise ConfigError(f"{task.name}: this version plays other rules, {rules}")
     found = None if policy in HEURISTICS else newest(find_policy(policy))
     return Row(
         board=board.name,

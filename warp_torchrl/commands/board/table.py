@@ -132,6 +132,10 @@ def _error(task: Task, row: Row) -> float:
     return scale * float(values.std(ddof=1)) / sqrt(len(values)) if len(values) > 1 else 0.0
 
 
+def _best(rows: Sequence[Row], task: Task) -> Row:
+    return max(rows, key=lambda row: task.points(row.tasks[task.name].mean))
+
+
 def _leaders(board: Board, rows: Sequence[Row]) -> list[str]:
     """Return a table of the best team and the best baseline of each task and knowledge."""
     lines = []
@@ -141,7 +145,7 @@ def _leaders(board: Board, rows: Sequence[Row]) -> list[str]:
             teams, baselines = ([row for row in same if (row.steps is None) is kind] for kind in (False, True))
             if not teams or not baselines:
                 continue
-            team, baseline = (max(each, key=lambda row: task.points(row.tasks[name].mean)) for each in (teams, baselines))
+            team, baseline = (_best(each, task) for each in (teams, baselines))
             metric = team.tasks[name].metric
             mine, theirs = (np.array([row.tasks[name].values]) for row in (team, baseline))
             gap = compare(mine, theirs, metric.name, sign_of(metric))
