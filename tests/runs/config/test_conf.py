@@ -98,6 +98,16 @@ def test_no_scenario_repeats_a_default_but_its_size_which_each_landscape_has_ano
                 assert not [key for key in value if value[key] == usual[key] and key != "size"], path.stem
 
 
+def test_an_environment_is_composed_of_the_options_of_a_training():
+    # worlds.yaml says them again, for it has none of the learner's.
+    def options(name):
+        listed = OmegaConf.load(conf_folder() / name)["defaults"]
+        return {group: option for each in listed if each != "_self_" for group, option in each.items()}
+
+    assert len(options("worlds.yaml")) == 11
+    assert options("worlds.yaml").items() <= options("train.yaml").items()
+
+
 def test_train_yaml_repeats_no_default_of_a_run():
     held = OmegaConf.load(conf_folder() / "train.yaml")
     assert not set(held) & {*defaults(RunConfig), *defaults(World)} - {*COMPONENTS, "mechanics"}
