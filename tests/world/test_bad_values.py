@@ -27,6 +27,7 @@ OUT_OF_RANGE = [
     (Fire, "oldest", [0, 1, 11, NAN]),  # 1 is younger than the youngest fuel
     (Fire, "burning_stages", [0, 6, NAN]),
     (Fire, "head_gain", [-0.1, 1.1, NAN]),
+    (Fire, "ffmc", [49.9, 101.1, NAN]),
     (Fire, "neighbours", [0, 5, 9, NAN]),
     (Fire, "wind_gain", [-0.1, 1.1, NAN]),
     (Fire, "wind_focus", [-0.1, 1.1, NAN]),
@@ -74,6 +75,7 @@ OUT_OF_RANGE = [
 NO_SUCH_OPTION = [
     (Fire, "diagonal", ["units"]),
     (Fire, "kernel", ["circle"]),
+    (Fire, "head_fuel", ["C-8"]),
     (Perlin, "frequency_law", ["texts"]),
     (Perlin, "thresholds", ["quantiles"]),
     (Perlin, "ages", ["old"]),
