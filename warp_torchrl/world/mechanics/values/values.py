@@ -29,6 +29,7 @@ _SHARE = 8
 """One in so many cells of a map has its flames measured in a tick at most; others of law ``rate`` in the next one."""
 _FLAMES = 1e-3  # m, of the least fire that is one
 _HECTARE = 1e4  # m2
+_LEAST = 1e-6  # ha
 
 
 @dataclass(eq=False, repr=False)
@@ -44,6 +45,8 @@ class Exposure(Batch):
     now: Tensor  # float32 [B], since ignition [minutes]
     held: Tensor  # bool [B], the fire has nowhere to go
     cost: Tensor  # float32 [B], of the vehicles so far [US dollars]
+    left: Tensor  # float32 [B], share of the worth that is left
+    size: Tensor  # float32 [B], area of the fire over that from which it has escaped
 
 
 @mechanic("values")
@@ -133,6 +136,8 @@ class Values(Mechanic):
             now=since.clone(),
             held=torch.zeros_like(state.terminated),
             cost=torch.zeros_like(since),
+            left=torch.ones_like(since),
+            size=self._size(state),
         )
         return state.with_planes(self.name, exposure)
 
@@ -167,13 +172,10 @@ class Values(Mechanic):
         fire has nowhere to go; ``contained_at`` the minutes from ignition until a cell last caught fire, and where the
         fire is not contained until now; ``cost`` that of the vehicles.
         """
-        exposure = state.planes(self.name, Exposure)
-        total, left = (each.flatten(1).sum(dim=1) for each in (exposure.worth, exposure.worth * self.left(state)))
-        touched = is_burning(state.cells) | state.burned | state.extinguished
-        area = touched.flatten(1).sum(dim=1) * (state.ground.cell_size**2 / _HECTARE)
+        exposure, area = state.planes(self.name, Exposure), _area(state)
         held = exposure.held | state.terminated
         return {
-            "worth_saved": torch.where(total > 0.0, left / total.clamp(min=1e-30), 1.0),
+            "worth_saved": self._left(exposure),
             "escaped": (area > self.escape_area).to(torch.float32),
             "contained": held.to(torch.float32),
             "contained_at": torch.where(held, exposure.grew, exposure.now),
@@ -181,10 +183,15 @@ class Values(Mechanic):
             "cost": exposure.cost.clone(),
         }
 
-    def left(self, state: WorldState) -> Tensor:
-        """Return the share of each cell's worth that flames and embers have left, float32 [B, H, W]."""
-        exposure = state.planes(self.name, Exposure)
-        return (1.0 - lost(exposure.flames, self.losses)) * exposure.spared
+    def _left(self, exposure: Exposure) -> Tensor:
+        """Return the share of the worth that flames and embers have left, float32 [B]; 1 where there was none."""
+        kept = (1.0 - lost(exposure.flames, self.losses)) * exposure.spared
+        total, left = (each.flatten(1).sum(dim=1) for each in (exposure.worth, exposure.worth * kept))
+        return torch.where(total > 0.0, left / total.clamp(min=1e-30), 1.0)
+
+    def _size(self, state: WorldState) -> Tensor:
+        """Return the area of the fire over that from which it has escaped, float32 [B]."""
+        return _area(state) / max(self.escape_area, _LEAST)
 
     def _expose(self, state: WorldState, ticks_now: Tensor, world: Rules) -> WorldState:
         before, here = state.planes(self.name, Exposure), ticks_now[:, None, None]
@@ -209,7 +216,9 @@ class Values(Mechanic):
             grew=torch.where(ticks_now & grows, since, before.grew),
             now=torch.where(ticks_now, since, before.now),
             held=torch.where(ticks_now, _is_held(state, world), before.held),
+            size=torch.where(ticks_now, self._size(state), before.size),
         )
+        exposure = exposure.replace(left=self._left(exposure))
         return state.with_planes(self.name, exposure)
 
     def _flames(self, state: WorldState, new: Tensor, fire: Automaton) -> tuple[Tensor, Tensor]:
@@ -229,6 +238,12 @@ class Values(Mechanic):
         """Return what each vehicle costs [US dollars an hour]."""
         rates = {**RATES, **self.rates}
         return tuple(rates[role] for role in world.team.agent_roles)
+
+
+def _area(state: WorldState) -> Tensor:
+    """Return the area that burns, has burned or was put out, float32 [B] [ha]."""
+    touched = is_burning(state.cells) | state.burned | state.extinguished
+    return touched.flatten(1).sum(dim=1) * (state.ground.cell_size**2 / _HECTARE)
 
 
 def _is_held(state: WorldState, world: Rules) -> Tensor:
