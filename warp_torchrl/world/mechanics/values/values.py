@@ -61,6 +61,8 @@ class Values(Mechanic):
     Attributes:
         points: (row, column, worth) of assets; rows and columns are those of the landscape's source [cells].
         houses: How many are drawn over the dry ground, each worth 1.
+        downwind: Least and greatest distance of these houses down the wind from the fire [cells], within 45 degrees of
+            it; more stand elsewhere where they do not fit. None: anywhere.
         losses: Share of the worth that is lost at each of the six fire intensity levels, flames up to 2, 4, 6, 8 and
             12 ft and over.
         reach: How far flames ignite assets on ground that cannot burn [m]: crown fires about 30 m (Cohen 2004).
@@ -78,6 +80,7 @@ class Values(Mechanic):
 
     points: tuple[tuple[float, float, float], ...] = ()
     houses: int = 0
+    downwind: tuple[float, float] | None = None
     losses: tuple[float, float, float, float, float, float] = HOMES
     reach: float = 30.0
     ember_chance: float = 0.1
@@ -100,6 +103,11 @@ class Values(Mechanic):
             rates=(0.0, 1e6),
             minutes_per_tick=(1e-3, 1440.0),
         )
+        if self.downwind is not None:
+            if not self.houses:
+                raise ValueError(f"downwind is read with houses, got {list(self.downwind)} and no houses")
+            if not 0.0 <= self.downwind[0] <= self.downwind[1] <= 1e6:
+                raise ValueError(f"downwind must be distances of 0 or more, the least first, got {list(self.downwind)}")
         if not all(0.0 <= loss <= 1.0 for loss in self.losses):
             raise ValueError(f"losses must be in [0, 1], got {list(self.losses)}")
         if any(worth < 0.0 for _, _, worth in self.points):
@@ -127,7 +135,7 @@ class Values(Mechanic):
         """Return worlds at the start of an episode, with what stands there; nothing was exposed or used yet."""
         since = state.tick.to(torch.float32) * minutes_of_tick(world, self.minutes_per_tick)
         exposure = Exposure(
-            worth=worth_of_assets(state, self.points, self.houses),
+            worth=worth_of_assets(state, self.points, self.houses, self.downwind),
             flames=torch.zeros_like(state.alpha),
             spared=torch.ones_like(state.alpha),
             met=torch.zeros_like(state.burned),
