@@ -36,7 +36,7 @@ def working(*at, drawing="TTTTTTTT aTTTTTTT TTTTTTTT TTTTTTTa", **given):
 
 @needs("lines")
 def test_agents_work_at_one_fire_together():
-    state, world = working((0, 1), (1, 1), water=20.0)
+    state, world = working((0, 1), (1, 1), water=4.0)
     assert acts(state, world) == ["EXTINGUISH", "EXTINGUISH"]
     alone = replace(world, mechanics=())
     assert acts(state.without_planes("lines"), alone)[0] == "EXTINGUISH"
@@ -63,5 +63,6 @@ def test_where_worth_is_the_goal_the_fire_before_the_house_comes_first():
     worth = torch.zeros_like(state.alpha)
     worth[0, 1, 12] = 1.0
     state = state.with_planes("values", Told(worth))
+    state = state.replace(ground=state.ground.replace(alpha=state.alpha * 0 + 0.5))  # of each cell of the way, a half
     assert acts(state, env.world)[0].endswith("WEST"), "three cells away, and four"
     assert acts(state, replace(env.world, goal="worth_saved"))[0].endswith("EAST")

@@ -18,6 +18,7 @@ from warp_torchrl.heuristics.base import (
 from warp_torchrl.heuristics.coordinated import LAST, Coordinated
 from warp_torchrl.heuristics.firebreaks import cells_to_clear
 from warp_torchrl.heuristics.paths import first_move, is_open, path_length
+from warp_torchrl.world.arrays.blocks import sums_about
 from warp_torchrl.world.arrays.detours import moves_from
 from warp_torchrl.world.arrays.listing import list_cells
 from warp_torchrl.world.fires.ahead import worth_ahead
@@ -26,6 +27,9 @@ from warp_torchrl.world.state.state import Action, Cover, WorldState
 from warp_torchrl.world.team.abilities import AgentContext, Extinguish, own_cell
 from warp_torchrl.world.team.acting import is_second
 from warp_torchrl.world.team.supply import mark_base
+
+_ABOUT = 3
+"""Cells about each other whose worth counts together."""
 
 
 class Dispatch(Coordinated):
@@ -38,13 +42,11 @@ class Dispatch(Coordinated):
 
     Where work takes time (``Mechanic.steps_to_put_out``), a cell costs an agent the steps of its way, and ``labour``
     times those that it alone would take there; fires at whose flames it cannot work come last. Agents work at one cell
-    together, clear their own cell where that is sooner done than half of putting out the fire beside it, and pass by
-    fires that they would take longer than ``patience`` for and did not set out for.
+    together, and clear their own cell where that is sooner done than half of putting out the fire beside it.
     """
 
-    worth_weight = 30.0  # of the cell ahead of which most worth lies [cells of distance]
+    worth_weight = 60.0  # of the cell ahead of which most worth lies [cells of distance]
     labour = 2.0  # steps of way for each of work
-    patience = 8.0  # steps
     effort = 2.0  # steps for each cell of a firebreak: move, clear; where lines take time, their steps and the move
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
@@ -59,13 +61,14 @@ class Dispatch(Coordinated):
     def value(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """Return each cell's value [cells of distance], float32 [B, H, W], and the fire front, bool [B, H, W].
 
-        Where worlds are compared by the worth that is left, that which lies ahead of each cell is added.
+        Where worlds are compared by the worth that is left, what lies ahead of each cell is added: the most that
+        fire there would come to within a few cells of each other.
         """
         value, front = super().value(state)
         worth = state.plane("values", "worth")
         if worth is None or self.world.goal != "worth_saved":
             return value, front
-        ahead = worth_ahead(state, self.world, worth)
+        ahead = worth_ahead(state, self.world, sums_about(worth, _ABOUT))
         most = (ahead * front).flatten(1).amax(dim=1).clamp(min=1e-9)[:, None, None]
         return value + self.worth_weight * ahead / most, front
 
@@ -96,11 +99,9 @@ class Dispatch(Coordinated):
             second = is_second(nearby, mask[..., Action.EXTINGUISH])
             return torch.where(second, move, extinguish_or(move, mask))
         fire, line = takes
-        is_far = (claims - state.vehicles.position).abs().amax(dim=-1) > 1
-        passes = is_far & (fire > self.patience)
         goes_on = state.vehicles.last_action == int(Action.CLEAR)
         clears = mask[..., Action.CLEAR] & (goes_on | (is_beside & (2.0 * line < fire)))
-        return torch.where(clears, int(Action.CLEAR), torch.where(passes, move, extinguish_or(move, mask)))
+        return torch.where(clears, int(Action.CLEAR), extinguish_or(move, mask))
 
     def steps_to(self, state: WorldState, cells: Tensor) -> Tensor:
         """Return what cells cost each agent, float32 [B, A, K] [cells of way]."""

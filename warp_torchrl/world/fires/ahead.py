@@ -10,7 +10,7 @@ from warp_torchrl.world.law.travel import rate_from
 from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.world import World
 
-WITHIN = 30.0
+WITHIN = 60.0
 """Minutes after which what burns later counts for half in each cell of its way."""
 
 
