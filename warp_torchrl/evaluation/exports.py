@@ -111,13 +111,13 @@ def rliable(entries: Sequence[SummaryRow]) -> dict[str, Any]:
 
 
 def _scores(entry: SummaryRow) -> np.ndarray:
-    """Return the mean of each run's last evaluation, more of which is better, float64 [runs]."""
+    """Return the mean of each run's last evaluation, where more is better, float64 [runs]."""
     means: np.ndarray = sign_of(entry.goal) * entry.value.mean(axis=1)
     return means
 
 
 def _rising(entry: SummaryRow) -> tuple[np.ndarray, np.ndarray]:
-    """Return ``curves``, more of which is better."""
+    """Return ``curves``, where more is better."""
     steps, values = curves(entry)
     return steps, sign_of(entry.goal) * values
 

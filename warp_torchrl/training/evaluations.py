@@ -55,7 +55,7 @@ class EvaluationsOnTheWay:
         return list(dict.fromkeys(("saved", *(each.name for each in self._goals))))
 
     def _having(self, metric: str) -> list[bool]:
-        """Return of which kinds a metric is told."""
+        """Return for each kind whether a metric is shown."""
         return [metric in ("saved", each.name) for each in self._goals]
 
     def _names(self, metric: str) -> list[str]:

@@ -15,7 +15,7 @@ WITHIN = 60.0
 
 
 def worth_ahead(state: WorldState, world: World, worth: Tensor, within: float = WITHIN) -> Tensor:
-    """Return the most that fire in each cell would come to, what it comes to later counting for less.
+    """Return the most that fire in each cell would reach, less for what it reaches later.
 
         V(c) = max over neighbours n of k max(w(n), V(n)),   k = T / (T + F)
 

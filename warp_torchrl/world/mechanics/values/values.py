@@ -227,7 +227,7 @@ class Values(Mechanic):
         return state.with_planes(self.name, exposure)
 
     def _spared(self, state: WorldState, spared: Tensor, here: Tensor) -> Tensor:
-        """Return the chance that no ember has ignited an asset, float32 [B, H, W], after those that fell in a tick."""
+        """Return the chance that no ember has ignited an asset, float32 [B, H, W], after a tick."""
         glow = state.plane("embers", "falls")
         caught = None if glow is None else self.ember_chance * glow.to(torch.float32) / 255.0
         return spared if caught is None else torch.where(here, spared * (1.0 - caught), spared)
