@@ -57,6 +57,8 @@ def test_a_goal_that_no_training_logs_has_no_curves_and_less_of_it_is_a_higher_s
     entries = [each._replace(goal=Metric("escaped", "less")) for each in read_rows(runs)]
     found = rliable(entries)
     assert np.allclose(found["scores"]["mappo"], [[-0.6, -0.2]]) and found["frames"] == [] and found["curves"] == {}
+    logged = [each._replace(goal=Metric("saved", "less")) for each in read_rows(runs)]
+    assert rliable(logged)["curves"] == {"mappo": [[[-0.2, -0.6], [-0.1, -0.2]]]}
     assert marl_eval(entries)["warp_torchrl"]["tiny"]["mappo"]["seed_1"] == {
         "step_0": {"step_count": 0, "escaped": [0.7, 0.9]},
         "absolute_metrics": {"escaped": [0.7, 0.9], "success": [1.0, 1.0]},
@@ -87,4 +89,4 @@ def test_the_command_writes_what_it_is_given_a_file_for(runs, capsys):
     assert files["curves"].read_bytes()[:4] == b"\x89PNG"
     with pytest.raises(SystemExit):
         main([str(runs / "3"), "--curves", str(runs / "none.png")])
-    assert "curves: no run has a metrics.csv with the forest saved" in capsys.readouterr().err
+    assert "curves: no run has a metrics.csv with what its policies are compared by" in capsys.readouterr().err

@@ -81,6 +81,14 @@ def test_columns_tell_what_each_kind_saves(tmp_path, caplog):
     assert len(set(of_kinds)) == 3
 
 
+@needs("values")
+def test_evaluations_on_the_way_tell_the_goal_too(tmp_path):
+    keys = ["mechanics.values={}", "goal=fire_size", "total_frames=32", "evaluation.interval=32"]
+    tiny(tmp_path, *keys, "evaluation.episodes=2").train()
+    found = rows(tmp_path)[-1]
+    assert float(found["evaluation/fire_size"]) > 1.0 > float(found["evaluation/saved"])
+
+
 def test_rewards_are_normalised_kind_by_kind(tmp_path):
     training = tiny(tmp_path, *THREE, "reward.normalise=true")
     batches = next(training.batches())

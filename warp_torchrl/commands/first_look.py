@@ -1,4 +1,4 @@
-"""A first look at a command line, for mistakes that can be told at once: torch and TorchRL take seconds to import.
+"""A first look at a command line, for mistakes that show at once: torch and TorchRL take seconds to import.
 
 It composes and checks as the command itself does, by excerpts of modules: see ``warp_torchrl.system.excerpt``. What
 they do not reach, as tables that plug-ins fill, is left to the command, which checks everything again.
@@ -33,7 +33,7 @@ _PARTS = {
 
 
 def first_look(name: str, arguments: Sequence[str]) -> None:
-    """Tell a mistake of a command line, and end the process with an exit code, if one is seen without torch.
+    """Print a mistake of a command line, and end the process with an exit code, if one is seen without torch.
 
     Args:
         name: ``train``, ``evaluate`` or ``predict``.

@@ -16,7 +16,9 @@ import torch
 
 from warp_torchrl.commands.failure import DONE
 from warp_torchrl.commands.program import command_help, run_program
+from warp_torchrl.evaluation.goal import goal
 from warp_torchrl.runs.checkpoint import holds_any
+from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import GROUPS, compose_config, conf_folder, plain, without_targets
 from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError, UnknownKeyError, construct
 from warp_torchrl.runs.config.grammar import check_flags, check_overrides
@@ -29,6 +31,7 @@ from warp_torchrl.system.foreign import read_json
 from warp_torchrl.system.lock import RunFolderLock
 from warp_torchrl.system.signals import DeferredSignals
 from warp_torchrl.training.checks import check_training
+from warp_torchrl.world.mechanics.mechanic import Metric
 
 if TYPE_CHECKING:
     import optuna
@@ -199,10 +202,11 @@ def _search(
     from warp_torchrl.commands.hyperparameters.search import Search
     from warp_torchrl.commands.hyperparameters.storage import open_study
 
-    study = open_study(folder, options)
+    aim = goal(run_config(base).world)
+    study = open_study(folder, options, aim)
     _first(study, space, base)
     log.info("search %s: %d keys, %d trials", folder, len(space), options.trials)
-    write_now = partial(write, study, space, fixed, options, folder)
+    write_now = partial(write, study, space, fixed, options, folder, aim)
     with DeferredSignals() as signals:
         search = Search(
             study=study,
@@ -211,6 +215,7 @@ def _search(
             folder=folder,
             start=_starter(space, fixed, options, base["seed"]),
             total=lambda values: int(values.get("total_frames", base["total_frames"])),
+            goal=aim,
             after=write_now,
             received=lambda: signals.received,
             seconds=_SECONDS_BETWEEN_LOOKS,
@@ -219,7 +224,7 @@ def _search(
             search.run()
         finally:
             print(write_now(), flush=True)
-            _draw(study, space, folder)
+            _draw(study, space, folder, aim)
     for each in search.failed:
         print(f"error: trial {each.number} failed: {each.user_attrs['reason']}", file=sys.stderr, flush=True)
     return 1 if search.failed else DONE
@@ -268,10 +273,10 @@ def _quoted(path: Path) -> str:
     return "'" + str(path).replace("\\", "\\\\").replace("'", "\\'") + "'"
 
 
-def _draw(study: "optuna.Study", space: Sequence[Dimension], folder: Path) -> None:
+def _draw(study: "optuna.Study", space: Sequence[Dimension], folder: Path, aim: Metric) -> None:
     from warp_torchrl.commands.hyperparameters.figure import draw_search
 
     try:
-        draw_search(study, space, folder)
+        draw_search(study, space, folder, aim)
     except ImportError:
         log.warning('no search.png: Matplotlib is missing, pip install "warp_torchrl[figures]"')

@@ -1,7 +1,7 @@
 """Results of many runs for marl-eval and rliable, and curves over seeds with intervals.
 
-Curves are of the evaluations on the way, ``evaluation/saved`` in ``metrics.csv``; of runs without those, of training,
-``world/saved``.
+Curves are of what a scenario's policies are compared by, its goal: of the evaluations on the way, ``evaluation/saved``
+in ``metrics.csv``; of runs without those, of training, ``world/saved``.
 """
 
 from collections.abc import Sequence
@@ -12,16 +12,16 @@ import numpy as np
 
 from warp_torchrl.env.pictures.drawing import line_style
 from warp_torchrl.evaluation.rows import SummaryRow
-from warp_torchrl.evaluation.runs.folders import FRAMES, SAVED, read_metrics
+from warp_torchrl.evaluation.runs.folders import FRAMES, read_metrics
 from warp_torchrl.evaluation.statistics import interval
+from warp_torchrl.evaluation.units import FORMS, on_axis, sign_of
 from warp_torchrl.system import disk
 
 ENVIRONMENT = "warp_torchrl"
-_EVALUATED, _SAVED = "evaluation/saved", "saved"
 
 
 def curves(entry: SummaryRow) -> tuple[np.ndarray, np.ndarray]:
-    """Return the forest saved over training, at the steps that all of a policy's runs have.
+    """Return the goal over training, at the steps that all of a policy's runs have.
 
     Returns:
         World steps, int64 [n], and values, float64 [runs, n]; n is 0 where a run has no ``metrics.csv``.
@@ -34,15 +34,11 @@ def curves(entry: SummaryRow) -> tuple[np.ndarray, np.ndarray]:
     if not paths or not all(path.exists() for path in paths):
         return np.empty(0, np.int64), np.empty((len(entry.value), 0))
     tables = [read_metrics(path) for path in paths]
-    is_evaluated = all(np.isfinite(table.get(_EVALUATED, np.full(1, np.nan))).any() for table in tables)
-    values = [_by_step(table, _EVALUATED if is_evaluated else SAVED) for table in tables]
+    evaluated, trained = (f"{part}/{entry.goal.name}" for part in ("evaluation", "world"))
+    is_evaluated = all(np.isfinite(table.get(evaluated, np.full(1, np.nan))).any() for table in tables)
+    values = [_by_step(table, evaluated if is_evaluated else trained) for table in tables]
     steps = sorted(set.intersection(*(set(each) for each in values)))
     return np.array(steps, np.int64), np.array([[each[step] for step in steps] for each in values])
-
-
-def _of_goal(entry: SummaryRow) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ``curves`` of what a scenario's policies are compared by: none but of the forest saved is logged."""
-    return curves(entry) if entry.goal.name == _SAVED else (np.empty(0, np.int64), np.empty((len(entry.value), 0)))
 
 
 def _by_step(table: dict[str, np.ndarray], column: str) -> dict[int, float]:
@@ -59,7 +55,7 @@ def marl_eval(entries: Sequence[SummaryRow]) -> dict[str, Any]:
     tasks: dict[str, Any] = {}
     for scenario in dict.fromkeys(entry.scenario for entry in entries):
         group = [entry for entry in entries if entry.scenario == scenario]
-        found = [_of_goal(entry) for entry in group]
+        found = [curves(entry) for entry in group]
         shared = _shared_steps(found)
         tasks[scenario] = {
             entry.policy: {f"seed_{run}": _run(entry, run, shared, curve) for run in range(len(entry.value))}
@@ -90,8 +86,8 @@ def rliable(entries: Sequence[SummaryRow]) -> dict[str, Any]:
 
     Returns:
         ``tasks``, the scenarios; ``scores``, by policy [runs, tasks], the mean of each run's last evaluation, of as
-        many runs as all its tasks have, and its negative where less is better; and ``frames`` with ``curves``, by
-        policy [runs, tasks, steps], at the steps that all trainings have.
+        many runs as all its tasks have; and ``frames`` with ``curves``, by policy [runs, tasks, steps], at the steps
+        that all trainings have. Both are negative where less is better.
 
     Raises:
         ValueError: If no policy was evaluated on every task.
@@ -104,7 +100,7 @@ def rliable(entries: Sequence[SummaryRow]) -> dict[str, Any]:
     if not whole:
         raise ValueError(f"no policy was evaluated on all of {', '.join(tasks)}")
     scores = {policy: _stacked([_scores(entry) for entry in rows]) for policy, rows in whole.items()}
-    found = {policy: [_of_goal(entry) for entry in rows] for policy, rows in whole.items() if rows[0].folders}
+    found = {policy: [_rising(entry) for entry in rows] for policy, rows in whole.items() if rows[0].folders}
     steps = _shared_steps([each for rows in found.values() for each in rows])
     trained = {policy: rows for policy, rows in found.items() if steps and all(each.size for each, _ in rows)}
     over_steps = {
@@ -115,9 +111,15 @@ def rliable(entries: Sequence[SummaryRow]) -> dict[str, Any]:
 
 
 def _scores(entry: SummaryRow) -> np.ndarray:
-    """Return the mean of each run's last evaluation, more of which is better, float64 [runs]."""
-    means: np.ndarray = entry.value.mean(axis=1)
-    return -means if entry.goal.better == "less" else means
+    """Return the mean of each run's last evaluation, where more is better, float64 [runs]."""
+    means: np.ndarray = sign_of(entry.goal) * entry.value.mean(axis=1)
+    return means
+
+
+def _rising(entry: SummaryRow) -> tuple[np.ndarray, np.ndarray]:
+    """Return ``curves``, where more is better."""
+    steps, values = curves(entry)
+    return steps, sign_of(entry.goal) * values
 
 
 def _stacked(tasks: Sequence[np.ndarray]) -> list[Any]:
@@ -136,7 +138,7 @@ def seed_bands(entry: SummaryRow) -> tuple[np.ndarray, np.ndarray, np.ndarray, n
 
 
 def draw_curves(entries: Sequence[SummaryRow], path: Path) -> None:
-    """Draw the forest saved over training, by scenario: the mean over seeds, in a band of its 95 % interval.
+    """Draw the goal over training, by scenario: the mean over seeds, in a band of its 95 % interval.
 
     Raises:
         ValueError: If no run has a ``metrics.csv``, or Matplotlib does not write such a file.
@@ -146,7 +148,7 @@ def draw_curves(entries: Sequence[SummaryRow], path: Path) -> None:
 
     drawn = [(entry, band) for entry in entries if entry.folders and (band := seed_bands(entry))[0].size]
     if not drawn:
-        raise ValueError("no run has a metrics.csv with the forest saved")
+        raise ValueError("no run has a metrics.csv with what its policies are compared by")
     scenarios = list(dict.fromkeys(entry.scenario for entry, _ in drawn))
     policies = list(dict.fromkeys(entry.policy for entry, _ in drawn))
     figure = Figure(figsize=(7.0, 2.6 * len(scenarios)), dpi=140, layout="constrained")
@@ -154,11 +156,12 @@ def draw_curves(entries: Sequence[SummaryRow], path: Path) -> None:
     for entry, (steps, mean, low, high) in drawn:
         look, panel = line_style(policies.index(entry.policy)), axes[entry.scenario]
         count = f"{len(entry.value)} seed{'s' if len(entry.value) > 1 else ''}"
-        panel.plot(steps, 100.0 * mean, label=f"{entry.policy} ({count})".replace("$", r"\$"), **look)
-        panel.fill_between(steps, 100.0 * low, 100.0 * high, color=look["color"], alpha=0.2, linewidth=0.0)
+        factor = FORMS[entry.goal.unit].factor
+        panel.plot(steps, factor * mean, label=f"{entry.policy} ({count})".replace("$", r"\$"), **look)
+        panel.fill_between(steps, factor * low, factor * high, color=look["color"], alpha=0.2, linewidth=0.0)
+        panel.set(xlabel="world steps", ylabel=on_axis(entry.goal))
     for scenario, panel in axes.items():
         panel.set_title(scenario.replace("$", r"\$"), fontsize=8.0, loc="left")
-        panel.set(xlabel="world steps", ylabel="forest saved [%]")
         panel.legend(fontsize=7.0, frameon=False)
     with disk.drafted(path) as draft:
         figure.savefig(draft, format=path.suffix[1:] or "png", metadata={"Software": None})

@@ -19,7 +19,7 @@ from warp_torchrl.evaluation.exports import draw_curves, marl_eval, rliable
 from warp_torchrl.evaluation.report import LEGEND, MEANING
 from warp_torchrl.evaluation.rows import SummaryRow, read_rows
 from warp_torchrl.evaluation.statistics import compare, performance_profile, summarise
-from warp_torchrl.evaluation.units import FORMS, headed, sign_of, written
+from warp_torchrl.evaluation.units import FORMS, headed, in_words, sign_of, written
 from warp_torchrl.system import disk
 from warp_torchrl.system.flags import FlagParser
 from warp_torchrl.system.foreign_text import plain_text
@@ -148,7 +148,7 @@ def draw_summary(entries: Sequence[SummaryRow], path: Path) -> None:
                 profile.plot(shown, shares, label=entry.policy, linewidth=1.4, **styles[entry.policy])
             profile.set(xlim=(0, end), ylim=(0, 102), ylabel="fires, %")
             if group is groups[-1] or any(goal != each[0].goal for each in groups):
-                words, unit = _WORDS.get(goal.name, goal.name.replace("_", " ")), "" if goal.unit == "1" else goal.unit
+                words, unit = in_words(goal), "" if goal.unit == "1" else goal.unit
                 bound = "at most" if goal.better == "less" else "at least"
                 bars.set_xlabel(", ".join(filter(None, (f"{words}: mean, 95 % interval", unit))))
                 profile.set_xlabel(", ".join(filter(None, (f"{words} on so many fires, {bound}", unit))))
@@ -158,7 +158,6 @@ def draw_summary(entries: Sequence[SummaryRow], path: Path) -> None:
             figure.savefig(draft, format=path.suffix[1:] or "png", metadata={"Software": None})
 
 
-_WORDS = {"saved": "forest saved", "watched": "front watched"}
 _LABEL_WIDTH, _LEGEND_WIDTH = 32, 130  # characters in a line
 _ROOM_BESIDE = 0.87  # of the axis; longer bars have their number inside
 

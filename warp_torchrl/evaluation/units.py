@@ -21,6 +21,7 @@ FORMS: dict[Unit, Form] = {
     "USD": Form(1.0, ".0f", "USD"),
 }
 """All units."""
+_WORDS = {"saved": "forest saved", "watched": "front watched"}
 
 
 def written(value: float, metric: Metric, sign: str = "") -> str:
@@ -29,10 +30,26 @@ def written(value: float, metric: Metric, sign: str = "") -> str:
     return f"{form.factor * value:{sign}{form.digits}}"
 
 
+def told(value: float, metric: Metric) -> str:
+    """Return a metric's number with its unit and its name, as in a sentence: 62.5 % saved."""
+    unit = "" if metric.unit == "1" else f" {metric.unit}"
+    return f"{written(value, metric)}{unit} {metric.title or metric.name}"
+
+
 def headed(metric: Metric, title: str = "") -> str:
     """Return a metric's title, or another one, with its unit, as a column has it."""
     title = title or metric.title or metric.name
     return title if metric.unit == "1" else f"{title} {metric.unit}"
+
+
+def in_words(metric: Metric) -> str:
+    """Return what figures call a metric."""
+    return _WORDS.get(metric.name, metric.name.replace("_", " "))
+
+
+def on_axis(metric: Metric) -> str:
+    """Return what figures call a metric, with its unit, as an axis has it."""
+    return in_words(metric) if metric.unit == "1" else f"{in_words(metric)} [{metric.unit}]"
 
 
 def sign_of(metric: Metric) -> float:

@@ -47,6 +47,18 @@ def steps_to_clear(state: WorldState, world: World) -> Tensor | None:
     return next((each for each in told if each is not None), None)
 
 
+def steps_to_put_out(state: WorldState, world: World, cells: Tensor) -> Tensor | None:
+    """Return the steps that each agent alone takes to put out fires, see ``Mechanic.steps_to_put_out``."""
+    told = (each.steps_to_put_out(state, cells) for each in reversed(world.loop))
+    return next((each for each in told if each is not None), None)
+
+
+def steps_here(state: WorldState, world: World) -> tuple[Tensor, Tensor] | None:
+    """Return the steps of each agent's acts where it is, see ``Mechanic.steps_here``."""
+    told = (each.steps_here(state) for each in reversed(world.loop))
+    return next((each for each in told if each is not None), None)
+
+
 def agent_distance(state: WorldState, cells: Tensor) -> Tensor:
     """Return the Chebyshev distance from each agent to cells [B, K], float32 [B, A, K]."""
     row, column = state.vehicles.position.to(torch.float32)[:, :, None].unbind(dim=-1)

@@ -63,7 +63,7 @@ class Tracker:
         several = len(training.run_config.kinds) > 1
         part, kind = ("evaluation", f"_{result.scenario}" if several else "") if not result.folder else ("final", "")
         means = {f"{part}/{name}{kind}": result.mean(name) for name in result.episodes}
-        own = {f"evaluation/saved{kind}"}  # which the row of ``metrics.csv`` has
+        own = {f"evaluation/{name}{kind}" for name in ("saved", result.goal.name)}  # which ``metrics.csv`` has
         self._send({name: mean for name, mean in means.items() if mean == mean and name not in own}, training.frames)
         if result.folder and self._sink is not None:
             sink = self._sink

@@ -13,6 +13,7 @@ from warp_torchrl.commands.hyperparameters.report import BEST, CSV, TABLE, exper
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.options import SearchOptions
 from warp_torchrl.runs.config.space import dimension
+from warp_torchrl.world.mechanics.mechanic import Metric
 
 GAMMA, EPOCHS, ACTIVATION = "algorithm.gamma", "algorithm.epochs", "model.activation"
 SPACE = [dimension(f"{GAMMA}=interval(0, 1)"), dimension(f"{EPOCHS}=range(1, 9)"), dimension(f"{ACTIVATION}=relu,tanh")]
@@ -57,6 +58,16 @@ def test_the_table_has_the_best_first_and_those_that_came_furthest_next(study):
         "| 5 | pruned at 0 % | - | - | 0.9 | 3 | relu |",
         "| 3 | failed | - | - | 0.3 | 3 | tanh |",
     ]
+
+
+def test_of_a_goal_of_which_less_is_better_the_least_is_the_best(tmp_path):
+    study, goal = optuna.create_study(direction="minimize"), Metric("fire_size", "less", "ha", title="fire size")
+    for gamma, size in ((0.25, 31.0), (0.75, 12.5), (0.1, 40.0)):
+        add(study, gamma, size, values=[size])
+    page = write(study, SPACE, [], SearchOptions(), tmp_path, goal)
+    assert "| trial | state | fire size ha |" in page and page.index("| 12.5 |") < page.index("| 31.0 |")
+    assert "The best is trial 1: 12.5 ha fire size in its evaluation." in page
+    assert "trial,state,fire_size,lowest" in (tmp_path / CSV).read_text()
 
 
 def test_what_ten_trials_hang_on_is_told(study):

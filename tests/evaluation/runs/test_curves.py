@@ -1,6 +1,7 @@
 """Learning curves: what is read of run folders, which runs are one line, and what is drawn of them."""
 
 import csv
+import json
 import math
 import sys
 
@@ -346,3 +347,14 @@ def test_a_checkpoint_without_a_configuration_is_told_in_one_line(tmp_path, caps
 def test_without_matplotlib_it_says_what_to_install(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert 'pip install "warp_torchrl[figures]"' in the_one_line(capsys, write_metrics(tmp_path))
+
+
+def test_a_run_is_drawn_by_the_goal_that_its_evaluation_says(tmp_path, matplotlib):
+    folder = write_run(tmp_path, columns={"world__escaped": [0.9, 0.8, 0.4]})
+    (each,) = lines(folder)
+    assert each.runs[0].goal.name == "saved"
+    told = {"scenario": "skirmish", "method": "mappo", "configuration": "c", "seeds": [1], "goal": "escaped"}
+    told |= {"goal_better": "less", "goal_unit": "%", "episodes": [{"escaped": 0.0, "success": 1.0}]}
+    (folder / "evaluation.json").write_text(json.dumps(told))
+    panel = curves.saved_curves(lines(folder)).axes[0]
+    assert panel.get_ylabel() == "escaped [%]" and panel.get_lines()[0].get_ydata().tolist() == [90.0, 80.0, 40.0]

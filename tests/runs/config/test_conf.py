@@ -12,7 +12,7 @@ from omegaconf import OmegaConf
 from torch._inductor.exc import InvalidCxxCompiler
 
 from tests.conftest import OF_DOCS
-from tests.world.mechanics.there import can_play
+from tests.world.mechanics.there import can_play, needs
 from warp_torchrl.api.make import make_env
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, conf_folder, plain, without_targets
@@ -29,7 +29,7 @@ from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.raster import Raster
 from warp_torchrl.world.world import World
 
-NEED_A_FOLDER = ("landfire", "wildland")
+NEED_A_FOLDER = ("attack_landfire", "landfire", "wildland")
 SCENARIOS = sorted(path.stem for path in (conf_folder() / "scenario").glob("*.yaml") if path.stem not in NEED_A_FOLDER)
 EXPERIMENTS = sorted(path.stem for folder in (conf_folder() / "experiment", OF_DOCS) for path in folder.glob("*.yaml"))
 OPTIONS = [(path.parent.name, path.stem) for path in sorted(conf_folder().glob("*/*.yaml"))]
@@ -187,7 +187,7 @@ def test_the_whole_array_runs_in_every_scenario(scenario, tmp_path):
 def test_every_scenario_is_a_run(scenario):
     plan = run_config(plain(compose_config("train", [f"scenario={scenario}"])))
     side = plan.world.size[0]
-    ends = {"haksar": 48 * side, "initial_attack": 360}  # fires are played until they are out; for six hours
+    ends = {"haksar": 48 * side, "initial_attack": 360, "wui": 240, "extended": 480}  # until it is out; for hours
     assert plan.scenario == scenario and plan.world.horizon == ends.get(scenario, 8 * side)
 
 
@@ -213,6 +213,17 @@ def test_the_landfire_scenario_runs_on_its_raster():
     env = plan.make_env(2, 0)
     env.rollout(6, break_when_any_done=False)
     assert isinstance(env.world_state.ground.terms, Slopes) and env.world.side_of_cell == 30.0
+
+
+@needs("values", "lines", "breach", "arrivals")
+def test_initial_attack_on_real_ground_steps_on_its_raster():
+    if not LANDFIRE.is_dir():
+        pytest.skip(f"no landscape at {LANDFIRE}")
+    pytest.importorskip("rasterio")
+    keys = ["scenario=attack_landfire", f"landscape.path={LANDFIRE}", "landscape.size=24"]
+    env = run_config(plain(compose_config("train", keys))).make_env(2, 0)
+    now = env.rollout(3, break_when_any_done=False)
+    assert env.world.goal == "escaped" and (now["next", "info", "fire_size"] > 0.0).all()
 
 
 def test_the_landfire_scenario_has_no_path_of_its_own():

@@ -14,11 +14,14 @@ import yaml
 from optuna.trial import FrozenTrial, TrialState
 
 from warp_torchrl.commands.hyperparameters.search import TRIALS, best_of
+from warp_torchrl.evaluation.goal import SAVED
+from warp_torchrl.evaluation.units import headed, sign_of, told, written
 from warp_torchrl.runs.config.compose import GROUPS, choices, compose_config, plain
 from warp_torchrl.runs.config.construction import COMPONENTS
 from warp_torchrl.runs.config.options import SearchOptions
 from warp_torchrl.runs.config.space import Dimension, value_of
 from warp_torchrl.system import disk
+from warp_torchrl.world.mechanics.mechanic import Metric
 
 TABLE, CSV, BEST = "search.md", "search.csv", "experiment/best.yaml"
 _STATES = {
@@ -33,24 +36,29 @@ _FEWEST_FOR_IMPORTANCE = 10
 
 
 def write(
-    study: optuna.Study, space: Sequence[Dimension], fixed: Sequence[str], options: SearchOptions, folder: Path
+    study: optuna.Study,
+    space: Sequence[Dimension],
+    fixed: Sequence[str],
+    options: SearchOptions,
+    folder: Path,
+    goal: Metric = SAVED,
 ) -> str:
     """Write table, CSV and best values into a search's folder, and return the table with what is said below it."""
-    page = "\n\n".join([trials_table(study, space), *_notes(study, space, fixed, options, folder)])
+    page = "\n\n".join([trials_table(study, space, goal), *_notes(study, space, fixed, options, folder, goal)])
     disk.replace(folder / TABLE, page + "\n")
-    disk.replace(folder / CSV, _csv(study, space))
-    best = best_of(study)
+    disk.replace(folder / CSV, _csv(study, space, goal))
+    best = best_of(study, goal)
     if best is not None:
         (folder / BEST).parent.mkdir(exist_ok=True)
-        disk.replace(folder / BEST, experiment(_best_overrides(best, space, fixed), _told(best, options)))
+        disk.replace(folder / BEST, experiment(_best_overrides(best, space, fixed), _told(best, options, goal)))
     return page
 
 
-def in_order(study: optuna.Study) -> list[FrozenTrial]:
+def in_order(study: optuna.Study, goal: Metric = SAVED) -> list[FrozenTrial]:
     """Return the trials, the best first, then the pruned ones by how far they came, then the others."""
-    order = list(_STATES)
+    order, sign = list(_STATES), sign_of(goal)
     trials = [each for each in study.get_trials(deepcopy=False) if each.state != TrialState.WAITING]
-    return sorted(trials, key=lambda each: (order.index(each.state), -_at(each), -_value(each), each.number))
+    return sorted(trials, key=lambda each: (order.index(each.state), -_at(each), _rank(each, sign), each.number))
 
 
 def _at(trial: FrozenTrial) -> int:
@@ -58,27 +66,27 @@ def _at(trial: FrozenTrial) -> int:
     return max(trial.intermediate_values, default=0) if trial.state == TrialState.PRUNED else 0
 
 
-def _value(trial: FrozenTrial) -> float:
-    return trial.value if trial.value is not None else -math.inf
+def _rank(trial: FrozenTrial, sign: float) -> float:
+    return math.inf if trial.value is None else -sign * trial.value
 
 
-def trials_table(study: optuna.Study, space: Sequence[Dimension]) -> str:
+def trials_table(study: optuna.Study, space: Sequence[Dimension], goal: Metric = SAVED) -> str:
     """Return a Markdown table of the trials.
 
-    ``saved`` is the value of a trial that was trained to its end, and ``world/saved`` of a pruned one where it ended.
+    The goal is the value of a trial that was trained to its end, and that in training of a pruned one where it ended.
     """
     importance = _importance(study)
     lines = [
-        "| trial | state | saved % | lowest .. highest seed | " + " | ".join(each.key for each in space) + " |",
+        f"| trial | state | {headed(goal)} | lowest .. highest seed | " + " | ".join(each.key for each in space) + " |",
         "|---" * (4 + len(space)) + "|",
     ]
-    for trial in in_order(study):
+    for trial in in_order(study, goal):
         seeds = trial.user_attrs.get("values", ())
         cells = [
             f"{trial.number}, as it is" if trial.user_attrs.get("as it is") else str(trial.number),
             f"pruned at {_at(trial)} %" if trial.state == TrialState.PRUNED else _STATES[trial.state],
-            "-" if trial.value is None else f"{100.0 * trial.value:.1f}",
-            f"{100.0 * min(seeds):.1f} .. {100.0 * max(seeds):.1f}" if len(seeds) > 1 else "-",
+            "-" if trial.value is None else written(trial.value, goal),
+            f"{written(min(seeds), goal)} .. {written(max(seeds), goal)}" if len(seeds) > 1 else "-",
             *(_shown(trial.params.get(each.key, "-")) for each in space),
         ]
         lines.append("| " + " | ".join(cells) + " |")
@@ -107,29 +115,34 @@ def _importance(study: optuna.Study) -> Mapping[str, float]:
 
 
 def _notes(
-    study: optuna.Study, space: Sequence[Dimension], fixed: Sequence[str], options: SearchOptions, folder: Path
+    study: optuna.Study,
+    space: Sequence[Dimension],
+    fixed: Sequence[str],
+    options: SearchOptions,
+    folder: Path,
+    goal: Metric,
 ) -> list[str]:
-    best = best_of(study)
+    best = best_of(study, goal)
     if best is None:
         return ["No trial was trained to its end."]
     overrides = " ".join(shlex.quote(each) for each in _best_overrides(best, space, fixed))
     pruned = study.get_trials(deepcopy=False, states=(TrialState.PRUNED,))
     return [
-        *(["Of a pruned trial it is what was saved in training, where that ended."] if pruned else []),
-        _told(best, options) + " " + _noise(study, options),
+        *(["Of a pruned trial it is that in training, where it ended."] if pruned else []),
+        _told(best, options, goal) + " " + _noise(study, options, goal),
         f"    python train.py {overrides}",
         f"    python train.py --config-dir {shlex.quote(str(folder))} experiment=best",
         f"The table is in {folder / TABLE}, for programs in {folder / CSV}, every training in {folder / TRIALS}.",
     ]
 
 
-def _told(best: FrozenTrial, options: SearchOptions) -> str:
+def _told(best: FrozenTrial, options: SearchOptions, goal: Metric) -> str:
     where = "in its evaluation" if options.objective == "evaluation" else "in the last fifth of its training"
     first = ", the values that the configuration has" if best.user_attrs.get("as it is") else ""
-    return f"The best is trial {best.number}{first}: {100.0 * _value(best):.1f} % saved {where}."
+    return f"The best is trial {best.number}{first}: {told(best.value or 0.0, goal)} {where}."
 
 
-def _noise(study: optuna.Study, options: SearchOptions) -> str:
+def _noise(study: optuna.Study, options: SearchOptions, goal: Metric) -> str:
     """Return what is known of the seeds' differences."""
     train = "Train the best ones with other seeds before you believe a difference: -m seed=10,11,12."
     if options.seeds == 1:
@@ -138,9 +151,10 @@ def _noise(study: optuna.Study, options: SearchOptions) -> str:
     spread = [_variance(each.user_attrs["values"]) for each in trained]
     deviation = math.sqrt(sum(spread) / len(spread))
     of_mean = deviation / math.sqrt(options.seeds)
+    unit = "" if goal.unit == "1" else f" {goal.unit}"
     return (
-        f"Seeds of one trial differ by {100.0 * deviation:.1f} % (standard deviation), means of {options.seeds} by "
-        f"{100.0 * of_mean:.1f} %. {train}"
+        f"Seeds of one trial differ by {written(deviation, goal)}{unit} (standard deviation), means of {options.seeds} "
+        f"by {written(of_mean, goal)}{unit}. {train}"
     )
 
 
@@ -149,14 +163,14 @@ def _variance(values: Sequence[float]) -> float:
     return sum((value - mean) ** 2 for value in values) / (len(values) - 1)
 
 
-def _csv(study: optuna.Study, space: Sequence[Dimension]) -> str:
+def _csv(study: optuna.Study, space: Sequence[Dimension], goal: Metric) -> str:
     """Return the trials, a row each: shares from 0 to 1, empty where there is none."""
     text = io.StringIO(newline="")
     rows = csv.writer(text)
     rows.writerow(
-        ["trial", "state", "saved", "lowest", "highest", "percent", "seconds", "reason"] + [s.key for s in space]
+        ["trial", "state", goal.name, "lowest", "highest", "percent", "seconds", "reason"] + [s.key for s in space]
     )
-    for trial in in_order(study):
+    for trial in in_order(study, goal):
         seeds = trial.user_attrs.get("values", ())
         rows.writerow(
             [

@@ -10,14 +10,17 @@ from pathlib import Path
 import optuna
 from optuna.trial import FrozenTrial, TrialState
 
-from warp_torchrl.commands.hyperparameters.measures import saved_at_the_end, saved_by_share, saved_in_evaluation
+from warp_torchrl.commands.hyperparameters.measures import goal_at_the_end, goal_by_share, goal_in_evaluation
 from warp_torchrl.commands.hyperparameters.storage import ask, draw_values, goes_on
+from warp_torchrl.evaluation.goal import SAVED
+from warp_torchrl.evaluation.units import sign_of, told
 from warp_torchrl.runs.checkpoint import holds_any, leave_policy
 from warp_torchrl.runs.config.options import SearchOptions
 from warp_torchrl.runs.config.space import Dimension, Value
 from warp_torchrl.runs.process import STOPPED, SearchEnded, StartedTraining
 from warp_torchrl.system.exit_codes import DISK, DONE, NUMERICAL
 from warp_torchrl.system.lock import RunFolderInUse, RunFolderLock
+from warp_torchrl.world.mechanics.mechanic import Metric
 
 log = logging.getLogger("warp_torchrl")
 
@@ -55,6 +58,7 @@ class Search:
         start: Starts a training with these values and the number of its seed, from 0, in a run folder, and returns it;
             if the folder holds a checkpoint, it resumes from there.
         total: Returns the frames of a training with these values.
+        goal: What policies of the worlds are compared by.
         after: Called after each trial that has ended.
         received: Returns the number of the signal that stops the search, 0 without one.
         seconds: Interval between two checks of the running trials [s].
@@ -66,6 +70,7 @@ class Search:
     folder: Path
     start: Callable[[Mapping[str, Value], int, Path], StartedTraining]
     total: Callable[[Mapping[str, Value]], int]
+    goal: Metric = SAVED
     after: Callable[[], object] = lambda: None
     received: Callable[[], int] = lambda: 0
     seconds: float = 1.0
@@ -141,7 +146,7 @@ class Search:
         """Report the progress of a trial, over all its seeds, and prune it if it is not worth its time."""
         if each.is_pruned:
             return
-        paths = [saved_by_share(folder / "metrics.csv", each.total) for folder in each.folders]
+        paths = [goal_by_share(folder / "metrics.csv", each.total, self.goal.name) for folder in each.folders]
         for share in sorted(set.intersection(*(set(path) for path in paths)) - each.reported):
             each.trial.report(sum(path[share] for path in paths) / len(paths), share)
             each.reported.add(share)
@@ -161,7 +166,7 @@ class Search:
             if len(known) == len(values):
                 each.trial.set_user_attr("values", known)
                 self.study.tell(number, sum(known) / len(known))
-                log.info("trial %d: %.1f %% saved; %s", number, 100.0 * sum(known) / len(known), self._so_far())
+                log.info("trial %d: %s; %s", number, told(sum(known) / len(known), self.goal), self._so_far())
                 return
             where = each.folders[values.index(None)]
             reason = f"{where} has no evaluation" if by_evaluation else f"no episode ended in the last fifth of {where}"
@@ -199,13 +204,13 @@ class Search:
 
     def _value(self, folder: Path, total: int) -> float | None:
         if self.options.objective == "evaluation":
-            return saved_in_evaluation(folder / "evaluation.json")
-        return saved_at_the_end(folder / "metrics.csv", total)
+            return goal_in_evaluation(folder / "evaluation.json", self.goal.name)
+        return goal_at_the_end(folder / "metrics.csv", total, self.goal.name)
 
     def _so_far(self) -> str:
         done = len(self._trials(*ENDED))
-        best = best_of(self.study)
-        said = "" if best is None else f", the best is trial {best.number} with {100.0 * (best.value or 0.0):.1f} %"
+        best = best_of(self.study, self.goal)
+        said = "" if best is None else f", the best is trial {best.number} with {told(best.value or 0.0, self.goal)}"
         return f"{done} of {self.options.trials} trials{said}"
 
     def _how_to_go_on(self) -> str:
@@ -223,10 +228,10 @@ ENDED = (TrialState.COMPLETE, TrialState.PRUNED)
 """What counts as a trial; failed ones do not."""
 
 
-def best_of(study: optuna.Study) -> FrozenTrial | None:
-    """Return the trial of the largest value, None where none was trained to its end."""
+def best_of(study: optuna.Study, goal: Metric = SAVED) -> FrozenTrial | None:
+    """Return the trial of the best value by a goal, None where none was trained to its end."""
     done = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
-    return max(done, key=lambda each: each.value or 0.0, default=None)
+    return max(done, key=lambda each: sign_of(goal) * (each.value or 0.0), default=None)
 
 
 def wait_until_free(folder: Path, seconds: float = _SECONDS_OF_A_SAVE) -> None:

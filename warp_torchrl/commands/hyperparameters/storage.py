@@ -14,10 +14,12 @@ from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 
 from warp_torchrl.commands.hyperparameters.measures import COMPARED_EVERY
+from warp_torchrl.evaluation.goal import SAVED
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.options import SearchOptions
 from warp_torchrl.runs.config.space import Dimension, Value
 from warp_torchrl.system.foreign import read_bytes
+from warp_torchrl.world.mechanics.mechanic import Metric
 
 JOURNAL = "journal.log"
 _STUDY = "search"
@@ -25,7 +27,7 @@ _LARGEST = 1_000_000_000  # bytes
 _REDUCTION = 3  # hyperband goes on with one trial of so many
 
 
-def open_study(folder: Path, options: SearchOptions) -> optuna.Study:
+def open_study(folder: Path, options: SearchOptions, goal: Metric = SAVED) -> optuna.Study:
     """Return the study in a search's folder, a new one where there is none. Nobody else may write to it.
 
     A last line that a kill has cut is dropped, as is a lock that it left.
@@ -43,7 +45,7 @@ def open_study(folder: Path, options: SearchOptions) -> optuna.Study:
         return optuna.create_study(
             storage=JournalStorage(JournalFileBackend(str(path))),
             study_name=_STUDY,
-            direction="maximize",
+            direction="minimize" if goal.better == "less" else "maximize",
             pruner=_pruner(options),
             load_if_exists=True,
         )

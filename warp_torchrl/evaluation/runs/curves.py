@@ -1,4 +1,5 @@
-"""Learning curves of runs, from their ``metrics.csv``: the curves of the WARP-CA paper, and the forest saved.
+"""Learning curves of runs, from their ``metrics.csv``: the curves of the WARP-CA paper, and the forest saved, or
+another goal.
 
 Runs that differ in their seed only are one line, their mean, with a band from minimum to maximum. Values are not
 smoothed; files of many rows are averaged over bins, and the figure says so.
@@ -15,7 +16,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from warp_torchrl.env.pictures.drawing import SOFT, line_style, sheet
-from warp_torchrl.evaluation.runs.folders import FRAMES, MOST_ROWS, SAVED, SECONDS, Run, read_run, run_folders
+from warp_torchrl.evaluation.goal import SAVED
+from warp_torchrl.evaluation.runs.folders import FRAMES, MOST_ROWS, SECONDS, Run, read_run, run_folders
+from warp_torchrl.evaluation.units import FORMS, on_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -189,17 +192,21 @@ def learning_curves(lines: Sequence[Line], panels: Sequence[Sequence[str]], titl
 
 
 def saved_curves(lines: Sequence[Line]) -> "Figure":
-    """Draw the forest saved in training, by scenario, over world steps and over minutes."""
+    """Draw what policies are compared by, in training, by scenario, over world steps and over minutes."""
     scenarios = list(dict.fromkeys(line.runs[0].scenario for line in lines))
     panels = [[f"{scenario} {x}" for x in (FRAMES, SECONDS)] for scenario in scenarios]
-    figure, axes = _sheet(panels, (7.2, 2.1 * len(panels) + 0.8), "Forest saved in training", lines)
+    goals = {line.runs[0].goal for line in lines}
+    title = "Goals in training" if goals != {SAVED} else "Forest saved in training"
+    figure, axes = _sheet(panels, (7.2, 2.1 * len(panels) + 0.8), title, lines)
     for scenario, (left, right) in zip(scenarios, panels):
         there = [line for line in lines if line.runs[0].scenario == scenario]
         factor, unit = _steps(there)
-        _draw_panel(axes[left], there, (FRAMES, factor), (SAVED, 100.0))
-        _draw_panel(axes[right], there, (SECONDS, 1.0 / 60.0), (SAVED, 100.0))
-        axes[left].set(ylabel="forest saved [%]", title=f"scenario {_plain(scenario)}", xlabel=unit)
-        axes[right].set(ylabel="forest saved [%]", title=f"scenario {_plain(scenario)}", xlabel="time [min]")
+        goal = there[0].runs[0].goal
+        drawn = f"world/{goal.name}", FORMS[goal.unit].factor
+        _draw_panel(axes[left], there, (FRAMES, factor), drawn)
+        _draw_panel(axes[right], there, (SECONDS, 1.0 / 60.0), drawn)
+        axes[left].set(ylabel=on_axis(goal), title=f"scenario {_plain(scenario)}", xlabel=unit)
+        axes[right].set(ylabel=on_axis(goal), title=f"scenario {_plain(scenario)}", xlabel="time [min]")
     return figure
 
 

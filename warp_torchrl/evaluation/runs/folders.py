@@ -11,12 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from warp_torchrl.evaluation.goal import SAVED as SAVED_TREES
 from warp_torchrl.evaluation.method import method, teacher_label, unusual
+from warp_torchrl.evaluation.reading import read_evaluation
+from warp_torchrl.evaluation.report import goal_of
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError, newest
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.saved_config import SavedConfig, completed
 from warp_torchrl.system.foreign import Foreign, open_file
 from warp_torchrl.system.foreign_yaml import read_yaml
+from warp_torchrl.world.mechanics.mechanic import Metric
 
 FRAMES, SECONDS, FPS, SAVED = "time/frames", "time/seconds", "time/fps", "world/saved"
 MOST_ROWS = 400
@@ -39,6 +43,8 @@ class Run:
         scenario: Name of the scenario.
         n_agents: A; None where it is not recorded.
         seed: None where it is not recorded.
+        goal: What policies are compared by in the run's worlds, as its ``evaluation.json`` says; the forest saved where
+            there is none yet.
         called: Name in the figure, if the user gave one.
     """
 
@@ -52,6 +58,7 @@ class Run:
     scenario: str
     n_agents: int | None
     seed: str | None
+    goal: Metric = SAVED_TREES
     called: str = ""
 
 
@@ -79,7 +86,15 @@ def read_run(folder: Path) -> Run:
         trained = _recorded(found, found.saved_config())
     except CheckpointError:  # none was saved yet
         trained = _not_recorded(folder.resolve())
-    return Run(folder=folder, rows=rows, columns=columns, rows_per_bin=rows_per_bin, **trained)
+    goal = _goal(folder / "evaluation.json")
+    return Run(folder=folder, rows=rows, columns=columns, rows_per_bin=rows_per_bin, goal=goal, **trained)
+
+
+def _goal(path: Path) -> Metric:
+    try:
+        return goal_of(read_evaluation(path))
+    except (OSError, ConfigError):  # the training has not ended yet, or was evaluated elsewhere
+        return SAVED_TREES
 
 
 def read_metrics(path: Path) -> dict[str, np.ndarray]:

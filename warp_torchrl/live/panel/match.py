@@ -6,7 +6,7 @@ from warp_torchrl.live.panel.tab import Tab, chosen_option
 from warp_torchrl.runs.config.compose import option_names
 from warp_torchrl.system.shipped import policy_names
 
-_NEED_A_FOLDER = ("landfire", "wildland")
+_NEED_A_FOLDER = ("attack_landfire", "landfire", "wildland")
 _ALONE = "nobody"
 
 

@@ -221,9 +221,9 @@ class SearchOptions:
         trials: Number of trials that are trained to their end or pruned.
         seeds: Training seeds of each trial, from ``seed`` upwards; its value is their mean.
         jobs: Number of parallel trials.
-        objective: Objective that is maximised: ``evaluation``, the forest that the trained policy saves on fires that
-            no training and no other evaluation has, or ``training``, the mean of ``world/saved`` over the last fifth of
-            a training.
+        objective: What is made best, by the goal of the scenario, as the forest saved: ``evaluation``, that of the
+            trained policy on fires that no training and no other evaluation has, or ``training``, its mean over the
+            last fifth of a training.
         pruner: ``median`` ends a trial that at equal frames is below the median of those before it; ``hyperband`` gives
             few of the trials many frames; ``none``.
         prune_from: Share of a training before which no trial is pruned.

@@ -1,4 +1,4 @@
-"""What a plug-in calls to add components, baselines, scenarios and rows of tables."""
+"""Registration: components, baselines, scenarios and rows of tables that plug-ins add."""
 
 import re
 import sys

@@ -234,6 +234,20 @@ class Mechanic:
         """
         return None
 
+    def steps_to_put_out(self, state: WorldState, cells: Tensor) -> Tensor | None:
+        """Return the steps that each agent alone takes to put out fires, float32 [B, A, K]; None where it takes one.
+
+        ``inf`` where it cannot. The cells are flat indices, int64 [B, K].
+        """
+        return None
+
+    def steps_here(self, state: WorldState) -> tuple[Tensor, Tensor] | None:
+        """Return the steps that each agent alone takes where it is, to put out the fire and to clear its cell.
+
+        float32 [B, A] each, ``inf`` where it cannot; None where each takes one.
+        """
+        return None
+
     def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
         """Return the rows of its metrics."""
         return ()

@@ -180,3 +180,28 @@ def test_what_cannot_be_is_refused(wrong, rule):
 def test_what_is_not_read_under_law_rate_is_refused():
     with pytest.raises(ValueError, match=r"lines\.minutes_per_tick is read under other laws than rate alone"):
         small_world(mechanics=(FireLines(minutes_per_tick=2.0),), fire=RATE)
+
+
+def test_planners_are_told_how_long_an_agent_alone_takes():
+    # Flames of 1 m: I = (1 / 0.0775)^(1 / 0.46) kW/m; t = 30 m x I x 30 s / 780 kW, and a step is a twentieth minute.
+    strong = (1.0 / 0.0775) ** (1.0 / 0.46)
+    lines = FireLines(means={"ugv": "crew1"})
+    state, _ = scene(lines, (2, 1), (0, 0), ground=FOREST)
+    cells = torch.tensor([[12, 12]])
+    takes = lines.steps_to_put_out(state, cells)
+    assert takes.flatten().tolist() == pytest.approx([30 * strong * 30 / 780 / 60 / 0.05] * 4, rel=1e-4)
+    fire, line = lines.steps_here(state)
+    assert fire[0, 0].item() == pytest.approx(takes[0, 0, 0].item(), rel=0.01)
+    assert line[0, 1].item() == pytest.approx(30 / 2.01168 / 0.05, rel=0.02), "in whole parts of 16,384"
+    shut = FireLines(means={"ugv": "crew1"}, hand_limit=0.9)
+    assert torch.isinf(shut.steps_to_put_out(scene(shut, (2, 1))[0], cells)).all()
+    flies, _ = scene(FireLines(), (2, 1), roles=("uav",))
+    assert FireLines().steps_to_put_out(flies, cells).tolist() == [[[1.0, 1.0]]], "aircraft drop at once"
+
+
+def test_they_are_told_of_the_side_on_which_a_fire_is_weakest():
+    lines = FireLines()
+    state, _ = scene(lines, (2, 1), (2, 3), fire=RATE, wind=(9.0, 0.0))  # in the rear, and at the head
+    takes = lines.steps_to_put_out(state, torch.tensor([[12]]))[0, :, 0]
+    rear, head = lines.steps_here(state)[0][0].tolist()
+    assert takes[0] == takes[1] == pytest.approx(rear, rel=0.01) and rear < head

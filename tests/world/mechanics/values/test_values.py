@@ -157,3 +157,18 @@ def test_a_role_without_a_rate_is_refused(monkeypatch):
     monkeypatch.delitem(__import__("warp_torchrl.world.mechanics.values.response", fromlist=["RATES"]).RATES, "scout")
     with pytest.raises(ValueError, match=r"values\.rates must name each role of the team, got none for scout"):
         small_world(mechanics=(Values(),), team=Team(n_agents=2, roles=("scout",)))
+
+
+def test_houses_may_stand_down_the_wind_alone():
+    # The fire is in column 1, and the wind goes to the east: columns 4 to 6 are 3 to 5 cells away.
+    drawing = " ".join(["TTTTTTTTT"] * 4 + ["TaTTTTTTT"] + ["TTTTTTTTT"] * 4)
+    for wind, place in (((5.0, 0.0), (slice(0, 9), slice(4, 7))), ((0.0, -5.0), (slice(7, 9), slice(0, 7)))):
+        world = small_world(mechanics=(Values(houses=5, downwind=(3.0, 5.0)),), fire=SPREAD, wind=Uniform(speed=5.0))
+        state = begun(world, (0, 0), (0, 0), drawing=drawing, ground="", fire=SPREAD, worlds=3, wind=wind)
+        worth = state.planes("values", Exposure).worth
+        assert worth.flatten(1).sum(1).tolist() == [5.0] * 3 == worth[:, *place].flatten(1).sum(1).tolist()
+        assert not torch.equal(worth[0], worth[1])
+    with pytest.raises(ValueError, match="downwind is read with houses"):
+        Values(downwind=(1.0, 2.0))
+    with pytest.raises(ValueError, match="downwind must be distances"):
+        Values(houses=2, downwind=(3.0, 2.0))

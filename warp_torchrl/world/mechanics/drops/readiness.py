@@ -1,4 +1,4 @@
-"""When aircraft may drop: with a load, by day, and out of smoke."""
+"""Readiness of aircraft to drop: with a load, by day, and out of smoke."""
 
 from typing import NamedTuple
 

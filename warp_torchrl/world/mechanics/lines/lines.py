@@ -16,7 +16,7 @@ from warp_torchrl.world.arrays.constants import numbers, whole_numbers
 from warp_torchrl.world.behaviour.firebreaks import intensity_of
 from warp_torchrl.world.law.flames import flames_of, heat_of
 from warp_torchrl.world.law.rate import RateFire
-from warp_torchrl.world.mechanics.lines.planning import open_fire, steps_left
+from warp_torchrl.world.mechanics.lines.planning import open_fire, steps_alone, steps_left
 from warp_torchrl.world.mechanics.lines.production import BUILDERS, kinds_of
 from warp_torchrl.world.mechanics.lines.tasks import (
     AIRCRAFT,
@@ -180,6 +180,15 @@ class FireLines(Mechanic):
         """Return how many steps of one agent the line of each cell still takes, float32 [B, H, W]."""
         clears = [self._index(role) for role in world.team.agent_roles if "clear" in ROLES[role].abilities]
         return steps_left(state, clears, self.gain) if clears else None
+
+    def steps_to_put_out(self, state: WorldState, cells: Tensor) -> Tensor | None:
+        """Return the steps that each agent alone takes to put out fires, float32 [B, A, K]; inf at flames too long."""
+        return steps_alone(state, cells, self._pace)
+
+    def steps_here(self, state: WorldState) -> tuple[Tensor, Tensor] | None:
+        """Return the steps that each agent alone takes to put out the fire beside it, and to clear its cell."""
+        fire, line = at_fire(state, fire_beside(state)[0], self._pace), at_line(state, self._pace)
+        return DONE / fire.share.to(torch.float32), DONE / line.share.to(torch.float32)
 
     def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
         """Return ``at_work``."""

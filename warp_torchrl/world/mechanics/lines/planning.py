@@ -5,10 +5,11 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.arrays.constants import numbers
 from warp_torchrl.world.arrays.geometry import neighbours
 from warp_torchrl.world.law.flames import weakest_way_out
 from warp_torchrl.world.mechanics.lines.production import metres_a_minute
-from warp_torchrl.world.mechanics.lines.tasks import DONE, Lines
+from warp_torchrl.world.mechanics.lines.tasks import AIRCRAFT, DONE, Lines, Pace
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.state import Cover, WorldState
 
@@ -24,9 +25,33 @@ def open_fire(state: WorldState, heat: Tensor, limit: float) -> Tensor:
         heat: Of an area that burns, float32 [B, H, W] [kJ/m2].
         limit: Intensity of the front towards the agent, at most [kW/m].
     """
-    burns = is_burning(state.cells)
-    stands = ~(burns | (state.cover == int(Cover.LAKE)))
-    return burns & (weakest_way_out(state, heat, neighbours(stands.to(torch.uint8), 0) > 0) <= limit)
+    return is_burning(state.cells) & (_weakest(state, heat) <= limit)
+
+
+def _weakest(state: WorldState, heat: Tensor) -> Tensor:
+    """Return the intensity of each cell's front to the neighbour where it is weakest, float32 [B, H, W] [kW/m]."""
+    stands = ~(is_burning(state.cells) | (state.cover == int(Cover.LAKE)))
+    return weakest_way_out(state, heat, neighbours(stands.to(torch.uint8), 0) > 0)
+
+
+def steps_alone(state: WorldState, cells: Tensor, pace: Pace) -> Tensor:
+    """Return the steps that each agent alone takes to put out fires, float32 [B, A, K]; inf at flames over its limit.
+
+    It works from the neighbour towards which the front is weakest.
+
+    Args:
+        state: The worlds.
+        cells: Flat indices, int64 [B, K].
+        pace: Of the work.
+    """
+    lines = state.planes("lines", Lines)
+    alike = torch.full_like(cells, pace.alike, dtype=torch.float32)
+    strong = alike if lines.heat is None else _weakest(state, lines.heat).flatten(1).gather(1, cells)
+    minutes = strong * (pace.seconds * state.ground.cell_size / 60.0)
+    steps = (minutes / lines.minutes).clamp(min=1.0)[:, None]
+    limit = numbers(pace.strongest, cells.device)[lines.means]
+    steps = torch.where((lines.means == AIRCRAFT)[..., None], 1.0, steps)
+    return torch.where(strong[:, None] <= limit[..., None], steps, torch.inf)
 
 
 def steps_left(state: WorldState, builders: Sequence[int], gain: float) -> Tensor:

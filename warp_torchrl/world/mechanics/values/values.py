@@ -31,6 +31,7 @@ _SHARE = 8
 """One in so many cells of a map has its flames measured in a tick at most; others of law ``rate`` in the next one."""
 _FLAMES = 1e-3  # m, of the least fire that is one
 _HECTARE = 1e4  # m2
+_LEAST = 1e-6  # ha
 
 
 @dataclass(eq=False, repr=False)
@@ -46,6 +47,8 @@ class Exposure(Batch):
     now: Tensor  # float32 [B], since ignition [minutes]
     held: Tensor  # bool [B], the fire has nowhere to go
     cost: Tensor  # float32 [B], of the vehicles so far [US dollars]
+    left: Tensor  # float32 [B], share of the worth that is left
+    size: Tensor  # float32 [B], area of the fire over that from which it has escaped
 
 
 @mechanic("values")
@@ -60,6 +63,8 @@ class Values(Mechanic):
     Attributes:
         points: (row, column, worth) of assets; rows and columns are those of the landscape's source [cells].
         houses: How many are drawn over the dry ground, each worth 1.
+        downwind: Least and greatest distance of these houses down the wind from the fire [cells], within 45 degrees of
+            it; more stand elsewhere where they do not fit. None: anywhere.
         losses: Share of the worth that is lost at each of the six fire intensity levels, flames up to 2, 4, 6, 8 and
             12 ft and over.
         reach: How far flames ignite assets on ground that cannot burn [m]: crown fires about 30 m (Cohen 2004).
@@ -77,6 +82,7 @@ class Values(Mechanic):
 
     points: tuple[tuple[float, float, float], ...] = ()
     houses: int = 0
+    downwind: tuple[float, float] | None = None
     losses: tuple[float, float, float, float, float, float] = HOMES
     reach: float = 30.0
     ember_chance: float = 0.1
@@ -99,6 +105,11 @@ class Values(Mechanic):
             rates=(0.0, 1e6),
             minutes_per_tick=(1e-3, 1440.0),
         )
+        if self.downwind is not None:
+            if not self.houses:
+                raise ValueError(f"downwind is read with houses, got {list(self.downwind)} and no houses")
+            if not 0.0 <= self.downwind[0] <= self.downwind[1] <= 1e6:
+                raise ValueError(f"downwind must be distances of 0 or more, the least first, got {list(self.downwind)}")
         if not all(0.0 <= loss <= 1.0 for loss in self.losses):
             raise ValueError(f"losses must be in [0, 1], got {list(self.losses)}")
         if any(worth < 0.0 for _, _, worth in self.points):
@@ -126,7 +137,7 @@ class Values(Mechanic):
         """Return worlds at the start of an episode, with what stands there; nothing was exposed or used yet."""
         since = state.tick.to(torch.float32) * minutes_of_tick(world, self.minutes_per_tick)
         exposure = Exposure(
-            worth=worth_of_assets(state, self.points, self.houses),
+            worth=worth_of_assets(state, self.points, self.houses, self.downwind),
             flames=torch.zeros_like(state.alpha),
             spared=torch.ones_like(state.alpha),
             met=torch.zeros_like(state.burned),
@@ -135,6 +146,8 @@ class Values(Mechanic):
             now=since.clone(),
             held=torch.zeros_like(state.terminated),
             cost=torch.zeros_like(since),
+            left=torch.ones_like(since),
+            size=self._size(state),
         )
         return state.with_planes(self.name, exposure)
 
@@ -169,13 +182,10 @@ class Values(Mechanic):
         fire has nowhere to go; ``contained_at`` the minutes from ignition until a cell last caught fire, and where the
         fire is not contained until now; ``cost`` that of the vehicles.
         """
-        exposure = state.planes(self.name, Exposure)
-        total, left = (each.flatten(1).sum(dim=1) for each in (exposure.worth, exposure.worth * self.left(state)))
-        touched = is_burning(state.cells) | state.burned | state.extinguished
-        area = touched.flatten(1).sum(dim=1) * (state.ground.cell_size**2 / _HECTARE)
+        exposure, area = state.planes(self.name, Exposure), _area(state)
         held = exposure.held | state.terminated
         return {
-            "worth_saved": torch.where(total > 0.0, left / total.clamp(min=1e-30), 1.0),
+            "worth_saved": self._left(exposure),
             "escaped": (area > self.escape_area).to(torch.float32),
             "contained": held.to(torch.float32),
             "contained_at": torch.where(held, exposure.grew, exposure.now),
@@ -183,10 +193,15 @@ class Values(Mechanic):
             "cost": exposure.cost.clone(),
         }
 
-    def left(self, state: WorldState) -> Tensor:
-        """Return the share of each cell's worth that flames and embers have left, float32 [B, H, W]."""
-        exposure = state.planes(self.name, Exposure)
-        return (1.0 - lost(exposure.flames, self.losses)) * exposure.spared
+    def _left(self, exposure: Exposure) -> Tensor:
+        """Return the share of the worth that flames and embers have left, float32 [B]; 1 where there was none."""
+        kept = (1.0 - lost(exposure.flames, self.losses)) * exposure.spared
+        total, left = (each.flatten(1).sum(dim=1) for each in (exposure.worth, exposure.worth * kept))
+        return torch.where(total > 0.0, left / total.clamp(min=1e-30), 1.0)
+
+    def _size(self, state: WorldState) -> Tensor:
+        """Return the area of the fire over that from which it has escaped, float32 [B]."""
+        return _area(state) / max(self.escape_area, _LEAST)
 
     def _expose(self, state: WorldState, ticks_now: Tensor, world: Rules) -> WorldState:
         before, here, burns = state.planes(self.name, Exposure), ticks_now[:, None, None], is_burning(state.cells)
@@ -206,11 +221,13 @@ class Values(Mechanic):
             grew=torch.where(ticks_now & grows, since, before.grew),
             now=torch.where(ticks_now, since, before.now),
             held=torch.where(ticks_now, _is_held(state, world), before.held),
+            size=torch.where(ticks_now, self._size(state), before.size),
         )
+        exposure = exposure.replace(left=self._left(exposure))
         return state.with_planes(self.name, exposure)
 
     def _spared(self, state: WorldState, spared: Tensor, here: Tensor) -> Tensor:
-        """Return the chance that no ember has ignited an asset, float32 [B, H, W], after those that fell in a tick."""
+        """Return the chance that no ember has ignited an asset, float32 [B, H, W], after a tick."""
         glow = state.plane("embers", "falls")
         caught = None if glow is None else self.ember_chance * glow.to(torch.float32) / 255.0
         return spared if caught is None else torch.where(here, spared * (1.0 - caught), spared)
@@ -232,6 +249,12 @@ class Values(Mechanic):
         """Return what each vehicle costs [US dollars an hour]."""
         rates = {**RATES, **self.rates}
         return tuple(rates[role] for role in world.team.agent_roles)
+
+
+def _area(state: WorldState) -> Tensor:
+    """Return the area that burns, has burned or was put out, float32 [B] [ha]."""
+    touched = is_burning(state.cells) | state.burned | state.extinguished
+    return touched.flatten(1).sum(dim=1) * (state.ground.cell_size**2 / _HECTARE)
 
 
 def _is_held(state: WorldState, world: Rules) -> Tensor:
