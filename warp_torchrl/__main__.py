@@ -47,7 +47,7 @@ def main() -> int:
 
 
 def run(name: str) -> int:
-    """Run a command with the arguments of the process, and return its exit code; mistakes are printed before imports."""
+    """Run a command with the arguments of the process, and return its exit code; mistakes come before imports."""
     if name in _LOOKED_AT:
         import_module("warp_torchrl.commands.first_look").first_look(name, sys.argv[1:])
     register_environments()
