@@ -307,6 +307,25 @@ def test_weather_is_a_folder_of_rasters_whose_wind_differs_by_place(folder):
     assert [each["file"].rpartition("/")[2] for each in told["files"]][-2:] == ["w_wd.tif", "w_ws.tif"]
 
 
+def test_sun_and_shade_are_computed_with_weather_by_place_and_rasters_of_dead_fuel_are_refused(folder, capsys):
+    place = {"cell": 500.0, "crs": "EPSG:32631", "west": 5e5}
+    write(folder / "w_wd.tif", np.full((4, 5), 270.0), **place)
+    write(folder / "w_ws.tif", np.full((4, 5), 3.0), **place)
+    write(folder / "fuel.tif", np.full(SHAPE, 102), "int16", cell=50.0, crs="EPSG:32631", west=5e5)
+    height = 30.0 * np.abs(np.arange(40.0) - 20.0)[:, None] * np.ones(44)  # downhill: the south above, the north below
+    write(folder / "elevation.tif", height, cell=50.0, crs="EPSG:32631", west=5e5)
+    (folder / "weather.csv").write_text("datetime,temp [C],RH,WS [m/s],WD\n2024-08-01 14:00,29.4,22,3,270\n")
+    (folder / "ignition.csv").write_text("row,column\n20,20\n")
+    given = {"weather": folder, "units.wind_speed": "m/s", "fires": 1, "hours": 3, "moisture": "fosberg"}
+    rothermel = {"landscape.table": "fbfm40", "fire.model": "fbfm40", "fire.slope_gain": 0, "fire.cell_deviation": 0}
+    assert main(arguments(folder, **given, **rothermel)) == 0
+    rate = read(folder / "out" / "rate.tif")
+    assert rate[17, 22] > 1.05 * rate[23, 22], "south slopes are drier by 2 %"
+    write(folder / "w_m1.tif", np.full((4, 5), 6.0), **place)
+    assert main(arguments(folder, **given, **rothermel, out=folder / "other")) == 2
+    assert "which rasters of the weather give by place" in capsys.readouterr().err
+
+
 def test_wind_is_bent_by_hills_where_that_is_asked(folder):
     height = np.zeros(SHAPE)
     height[:, 24:30] = 150.0  # a ridge across the wind

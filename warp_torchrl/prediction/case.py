@@ -17,7 +17,7 @@ from warp_torchrl.world.air.files import minutes_in, read_any
 from warp_torchrl.world.air.folder import rasters_of
 from warp_torchrl.world.air.options import WeatherOptions
 from warp_torchrl.world.air.points import window_of
-from warp_torchrl.world.air.sunlight import Sunlight, by_sunlight
+from warp_torchrl.world.air.sunlight import Sunlight, Sunlit, by_sunlight
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.ignition.file import read_ignition, read_ignition_times
 from warp_torchrl.world.law.rate import RateFire
@@ -81,7 +81,7 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
     told, sunlight = None, None
     middle = _middle(place, (height, width))
     if options.moisture == "fosberg":
-        weather, sunlight = _sunlit(weather, fire, by_place, middle)
+        weather, by_place, sunlight = _sunlit(weather, fire, by_place, middle)
     if options.season == "date":
         fire, weather, told = _season(ground, middle, start)(fire, weather)
     return Case(
@@ -141,14 +141,12 @@ def _weather(options: PredictionOptions, window: Grid, convergence: float) -> tu
 
 def _sunlit(
     weather: WeatherTable, fire: RateFire, fields: WeatherFields | None, middle: tuple[float, float] | None
-) -> tuple[WeatherTable, list[Sunlight]]:
+) -> Sunlit:
     """Return the weather with the dead moistures of level ground, and how they differ by place."""
     if fire.bed.table is None:
         raise ValueError("moisture=fosberg is read by Rothermel's fuels, fbfm13 and fbfm40, got fire.model=fbp")
-    if fields is not None:
-        raise ValueError("moisture=fosberg is read with a table of weather, got weather by place")
     latitude, longitude = middle or (0.0, None)
-    return by_sunlight(weather, longitude, in_south=latitude < 0.0)
+    return by_sunlight(weather, fields, longitude, in_south=latitude < 0.0)
 
 
 def _season(ground: Landscape, middle: tuple[float, float] | None, start: float) -> Season:

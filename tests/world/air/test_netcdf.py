@@ -10,6 +10,7 @@ from tests.world.rasters import rasterio, write
 from warp_torchrl.world.air.folder import read_folder
 from warp_torchrl.world.air.netcdf import netcdf_minutes, read_netcdf
 from warp_torchrl.world.air.options import WeatherOptions
+from warp_torchrl.world.air.sunlight import by_sunlight
 from warp_torchrl.world.behaviour.moistures import MOISTURES
 from warp_torchrl.world.state.window import Window
 from warp_torchrl.world.terrain.crs import project, stated_crs
@@ -80,6 +81,15 @@ def test_era5_gives_wind_moistures_and_times(tmp_path, grid):
         code = hourly_ffmc(code, *(torch.tensor(each) for each in (30.0, humidity[0], 5.0, 0.0)))
     assert table.ffmc[1] == pytest.approx(float(code), rel=1e-4)
     assert table.live_woody is None and bool(fields.moisture[:, list(MOISTURES).index("bui")].isnan().all())
+
+
+def test_fosbergs_tables_take_the_air_by_place(tmp_path, grid):
+    # 86 F and 29 %: reference 4; in July at noon, at 3 degrees east, 0 more on level ground. In the second hour it rains.
+    told = {**ERA5, "tp": (np.array([0.0, 0.001])[:, None, None], {"units": "m"})}
+    table, fields, sunlight = by_sunlight(*read_netcdf(degrees(tmp_path / "a.nc", **told), grid), longitude=3.0)
+    assert fields.air[0, :, 0, 0].tolist() == pytest.approx([30.0, 28.93, 0.0], abs=0.01)
+    assert fields.moisture[0, :3, 0, 0].tolist() == [4.0, 5.0, 6.0] and table.dead_1h.tolist() == [4.0, 35.0]
+    assert sunlight[0].dry.all() and not sunlight[1].dry.any()
 
 
 def test_longitudes_to_360_and_rows_from_the_south_lie_where_they_are(tmp_path, grid):

@@ -31,6 +31,8 @@ from warp_torchrl.world.weather.units import unit_of
 
 ENDS = (".nc", ".nc4", ".cdf")
 _AS_STATED = WeatherOptions()
+_AIR = ("temperature", "humidity", "wet")
+"""What ``WeatherFields.air`` holds."""
 _TIMES = ("valid_time", "time")
 _OF_GRIB = {
     **{"10u": "wind_u", "10v": "wind_v", "si10": "wind_speed", "10si": "wind_speed"},
@@ -97,7 +99,8 @@ def read_netcdf(path: Path, window: Grid, options: WeatherOptions = _AS_STATED) 
     wind = turned(torch.stack((placed("wind_u"), placed("wind_v")), dim=1), torch.deg2rad(torch.tensor([turn])))
     unknown = torch.full((len(hours), *points.shape), math.nan)
     moisture = torch.stack([placed(name) if name in known else unknown for name in MOISTURES], dim=1)
-    fields = WeatherFields(lattice, wind * factor, moisture)
+    air = torch.stack([placed(name) for name in _AIR], dim=1) if "wet" in known else None
+    fields = WeatherFields(lattice, wind * factor, moisture, air)
     means = {name: placed(name).mean((1, 2)) for name in ("temperature", "humidity", "rain", *ASKED) if name in known}
     if "wind_gust" in means:
         means["wind_gust"] = means["wind_gust"] * factor
@@ -218,7 +221,8 @@ def _completed(known: dict[str, Tensor], hours: Tensor, factor: float, start_ffm
     if not {"temperature", "humidity"} <= known.keys():
         return known
     air, rain = (known["temperature"], known["humidity"]), known.get("rain")
-    dead = dict(zip(("dead_1h", "dead_10h", "dead_100h"), dead_moisture(*air, rain), strict=True))
+    falls = torch.zeros_like(air[0]) if rain is None else torch.where(rain.isnan(), rain, (rain > 0.0).float())
+    dead = {"wet": falls} | dict(zip(("dead_1h", "dead_10h", "dead_100h"), dead_moisture(*air, rain), strict=True))
     if rain is not None and "ffmc" not in known:
         speed = torch.hypot(known["wind_u"], known["wind_v"]) * factor
         code, codes = torch.full_like(rain[0], start_ffmc), []
