@@ -242,6 +242,10 @@ def test_a_prediction_is_corrected_by_what_was_seen(folder, capsys):
     assert len(lines) == 1 + 2 * 5 and lines[0].startswith("minutes,lead_minutes,kind,burned_ha,forecast,jaccard")
     chance, hours = read(out / "burn_probability.tif"), read(out / "arrival_hours.tif")
     assert (chance == 1.0).sum() * 0.25 >= told["observations"][1]["burned_ha"] and np.nanmax(hours) <= 1.0
+    gusts = {"gusts": "true", "gustiness.factor": 2, "out": folder / "gusts"}
+    assert main(arguments(folder, **{**given, **gusts})) == 0
+    other = json.loads((folder / "gusts" / "report.json").read_text())["observed"]
+    assert other["observations"][1]["posterior"] != told["observations"][1]["posterior"]
 
 
 def test_the_times_of_every_fire_are_written_where_that_is_said(folder):
@@ -360,7 +364,7 @@ def test_gusts_and_acceleration_act_and_the_column_of_gusts_is_read_for_them(fol
         ({"season": "date"}, "season=date knows Canada and Alaska in Canadian fuel, got 0.4"),
         ({"gusts": "true"}, "gusts needs a column of gusts in the weather, or gustiness.factor"),
         ({"gustiness.factor": 1.5}, "gustiness is read with gusts=true"),
-        ({"gusts": "true", "observed": "seen.geojson"}, "gusts must be false with observed=FILE"),
+        ({"gusts": "true", "observed": "seen.geojson"}, "gusts needs a column of gusts in the weather"),
         ({"weather": "none.nc"}, "weather must be"),
     ],
 )

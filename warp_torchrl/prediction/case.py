@@ -73,6 +73,8 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
     rows, columns = slice(corner[0], corner[0] + height), slice(corner[1], corner[1] + width)
     convergence = _convergence(place, (height, width)) if options.true_north else 0.0
     weather, by_place = _weather(options, window_of(place.grid, place.corner, (height, width)), convergence)
+    if options.gusts:
+        options.gustiness.check(weather)
     start, lit, later = _started(options, place.grid, lit)
     closed = None
     if options.barriers is not None:

@@ -84,7 +84,7 @@ def test_era5_gives_wind_moistures_and_times(tmp_path, grid):
 
 
 def test_fosbergs_tables_take_the_air_by_place(tmp_path, grid):
-    # 86 F and 29 %: reference 4; in July at noon, at 3 degrees east, 0 more on level ground. In the second hour it rains.
+    # 86 F and 29 %: reference 4; in July at noon, at 3 degrees east, 0 more on level ground. Then it rains.
     told = {**ERA5, "tp": (np.array([0.0, 0.001])[:, None, None], {"units": "m"})}
     table, fields, sunlight = by_sunlight(*read_netcdf(degrees(tmp_path / "a.nc", **told), grid), longitude=3.0)
     assert fields.air[0, :, 0, 0].tolist() == pytest.approx([30.0, 28.93, 0.0], abs=0.01)
