@@ -15,6 +15,7 @@ from warp_torchrl.world.backends.spreading import Hour
 from warp_torchrl.world.behaviour.firebrands import Firebrands
 from warp_torchrl.world.fires.fastest import RowsOfMap, fastest_heads, heads_of_strips
 from warp_torchrl.world.fires.later import LaterFires
+from warp_torchrl.world.fires.paces import drawn_paces, rates_in
 from warp_torchrl.world.fires.parts import Division, Ended, check_memory
 from warp_torchrl.world.fires.pieces import from_ignition
 from warp_torchrl.world.fires.spell import Spell, air_in, can_ignite, heads, spread_in, ticks_of
@@ -223,21 +224,9 @@ class Fires:
 
     def pace(self, key: Tensor, window: Window) -> Tensor:
         """Return the factor on the times of some fires in a window, float32 [b, h, w]."""
-        keys = key.chunk(len(self.laws))
-        paces = [
-            law.pace(each, self.size) if window.is_whole else law.pace_in(each, window)
-            for law, each in zip(self.laws, keys, strict=True)
-        ]
-        pace = paces[0] if len(paces) == 1 else torch.cat(paces)
-        pace = pace if self.rate is None else pace / self._rates(self.rate, window)
+        pace = drawn_paces(self.laws, key, window)
+        pace = pace if self.rate is None else pace / rates_in(self.rate, self.sector, window)
         return pace if self.half_way is None else torch.where(window.cut(self.half_way, False), 0.5 * pace, pace)
-
-    def _rates(self, rate: Tensor, window: Window) -> Tensor:
-        """Return the factor on the rates of each fire in a window, float32 [b, h, w] or [b, 1, 1]."""
-        if self.sector is None:
-            return rate[:, None, None]
-        place = window.cut(self.sector, 0)
-        return rate.index_select(1, place.flatten()).view(len(rate), *place.shape)
 
     def _ember_ground(self) -> EmberGround:
         """Return what firebrands fly over, by the first law."""
