@@ -273,7 +273,7 @@ def test_nothing_of_ours_listens_but_the_live_page():
 
 def is_page(module: str) -> bool:
     """Whether a module draws with viser: the page, which a browser shows, or an episode's."""
-    own = ("live/episode", "live/incoming", "live/page", "live/scene", "live/stage")
+    own = ("live/episode", "live/incoming", "live/page", "live/scene", "live/screening", "live/stage")
     return module in own or module.startswith("live/panel")
 
 

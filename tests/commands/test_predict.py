@@ -243,6 +243,10 @@ def test_a_prediction_is_corrected_by_what_was_seen(folder, capsys):
     assert len(lines) == 1 + 2 * 5 and lines[0].startswith("minutes,lead_minutes,kind,burned_ha,forecast,jaccard")
     chance, hours = read(out / "burn_probability.tif"), read(out / "arrival_hours.tif")
     assert (chance == 1.0).sum() * 0.25 >= told["observations"][1]["burned_ha"] and np.nanmax(hours) <= 1.0
+    gusts = {"gusts": "true", "gustiness.factor": 2, "out": folder / "gusts"}
+    assert main(arguments(folder, **{**given, **gusts})) == 0
+    other = json.loads((folder / "gusts" / "report.json").read_text())["observed"]
+    assert other["observations"][1]["posterior"] != told["observations"][1]["posterior"]
 
 
 def test_the_times_of_every_fire_are_written_where_that_is_said(folder):
@@ -308,6 +312,25 @@ def test_weather_is_a_folder_of_rasters_whose_wind_differs_by_place(folder):
     assert [each["file"].rpartition("/")[2] for each in told["files"]][-2:] == ["w_wd.tif", "w_ws.tif"]
 
 
+def test_sun_and_shade_are_computed_with_weather_by_place_and_rasters_of_dead_fuel_are_refused(folder, capsys):
+    place = {"cell": 500.0, "crs": "EPSG:32631", "west": 5e5}
+    write(folder / "w_wd.tif", np.full((4, 5), 270.0), **place)
+    write(folder / "w_ws.tif", np.full((4, 5), 3.0), **place)
+    write(folder / "fuel.tif", np.full(SHAPE, 102), "int16", cell=50.0, crs="EPSG:32631", west=5e5)
+    height = 30.0 * np.abs(np.arange(40.0) - 20.0)[:, None] * np.ones(44)  # downhill: the south above, the north below
+    write(folder / "elevation.tif", height, cell=50.0, crs="EPSG:32631", west=5e5)
+    (folder / "weather.csv").write_text("datetime,temp [C],RH,WS [m/s],WD\n2024-08-01 14:00,29.4,22,3,270\n")
+    (folder / "ignition.csv").write_text("row,column\n20,20\n")
+    given = {"weather": folder, "units.wind_speed": "m/s", "fires": 1, "hours": 3, "moisture": "fosberg"}
+    rothermel = {"landscape.table": "fbfm40", "fire.model": "fbfm40", "fire.slope_gain": 0, "fire.cell_deviation": 0}
+    assert main(arguments(folder, **given, **rothermel)) == 0
+    rate = read(folder / "out" / "rate.tif")
+    assert rate[17, 22] > 1.05 * rate[23, 22], "south slopes are drier by 2 %"
+    write(folder / "w_m1.tif", np.full((4, 5), 6.0), **place)
+    assert main(arguments(folder, **given, **rothermel, out=folder / "other")) == 2
+    assert "which rasters of the weather give by place" in capsys.readouterr().err
+
+
 def test_wind_is_bent_by_hills_where_that_is_asked(folder):
     height = np.zeros(SHAPE)
     height[:, 24:30] = 150.0  # a ridge across the wind
@@ -342,7 +365,7 @@ def test_gusts_and_acceleration_act_and_the_column_of_gusts_is_read_for_them(fol
         ({"season": "date"}, "season=date knows Canada and Alaska in Canadian fuel, got 0.4"),
         ({"gusts": "true"}, "gusts needs a column of gusts in the weather, or gustiness.factor"),
         ({"gustiness.factor": 1.5}, "gustiness is read with gusts=true"),
-        ({"gusts": "true", "observed": "seen.geojson"}, "gusts must be false with observed=FILE"),
+        ({"gusts": "true", "observed": "seen.geojson"}, "gusts needs a column of gusts in the weather"),
         ({"weather": "none.nc"}, "weather must be"),
     ],
 )

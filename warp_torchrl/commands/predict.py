@@ -155,6 +155,7 @@ def _correct(case: Case, options: PredictionOptions, seen: Sequence[Observation]
         air=Weather(table=case.weather, convergence=case.convergence, fields=case.fields, sunlight=case.sunlight),
         start=case.start,
         lit=case.ignition,
+        gusts=options.gustiness if options.gusts else None,
     )
     correction = Correction(
         members=options.fires, deviations=_deviations(case, options), sensor=options.hot_spots, seed=options.seed

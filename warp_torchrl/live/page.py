@@ -12,9 +12,9 @@ import viser
 
 from warp_torchrl.demonstrations.recording import OpenRecording
 from warp_torchrl.env.pictures.veil import View, checked_view, first_view
-from warp_torchrl.live import incoming, words
+from warp_torchrl.live import words
 from warp_torchrl.live.address import Address
-from warp_torchrl.live.door import LOG, Door, arrived
+from warp_torchrl.live.door import Door, arrived
 from warp_torchrl.live.inbox import Act, Inbox
 from warp_torchrl.live.keeping import Keeper
 from warp_torchrl.live.learning import PageTraining
@@ -23,6 +23,7 @@ from warp_torchrl.live.once import Once
 from warp_torchrl.live.panel.panel import PACES, Panel, notify
 from warp_torchrl.live.panel.tab import errors_shown
 from warp_torchrl.live.scene import aim, furnish, local_server, map_offsets, quiet
+from warp_torchrl.live.screening import Screen
 from warp_torchrl.live.stage import Stage
 from warp_torchrl.system.foreign_text import plain_text
 
@@ -30,7 +31,6 @@ RECORDINGS = Path("recordings")
 _FOLLOWED_EVERY = 5.0  # seconds between two looks for newer weights
 _PAINTED_EVERY = 0.25  # seconds between two pictures of what takes long to make, while the match plays
 _PAINTED_SHARE = 0.2  # of the time that these pictures may take
-_MOST_TOLD = 20  # refused messages of one connection that are told
 
 
 class Page:
@@ -61,13 +61,12 @@ class Page:
         self._panels: dict[int, Panel] = {}
         self._stages: list[Stage] = []
         self._clients: WeakKeyDictionary[object, viser.ClientHandle] = WeakKeyDictionary()  # by connection
-        self._refusals: WeakKeyDictionary[object, int] = WeakKeyDictionary()  # by connection
         self._is_left_out: set[int] = set()  # persons who were told that they ask for too much
         self._stopped = threading.Event()
         self._followed = time.monotonic()
         self._painted, self._painting_took = 0.0, 0.0
         warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")  # of a browser that just left
-        self.server = local_server(Door(listener, access, self._screen))
+        self.server = local_server(Door(listener, access, Screen(self._clients)))
         self._furnish()
         self.open(self.match)
         self.server.on_client_connect(self._arrive)
@@ -264,28 +263,6 @@ class Page:
         panel = self._panels.get(event.client_id)
         if panel is not None:
             self.ask(event.client_id, partial(panel.click, stage, event.ray_origin, event.ray_direction))
-
-    def _screen(self, connection: object, message: bytes) -> bool:
-        """Return whether viser receives a message; the browser is informed of a refused one."""
-        client = self._clients.get(connection)
-        try:
-            incoming.check(message, None if client is None else client.gui)
-        except Exception as error:  # a fault of the check lets nothing in
-            self._refuse(connection, client, error)
-            return False
-        return True
-
-    def _refuse(self, connection: object, client: viser.ClientHandle | None, error: Exception) -> None:
-        count = self._refusals[connection] = self._refusals.get(connection, 0) + 1
-        if isinstance(error, incoming.Misfit):
-            incoming.put_back(error.control)
-        if count > _MOST_TOLD:
-            return
-        line = plain_text(str(error))
-        who = "a browser" if client is None else f"browser {client.client_id}"
-        LOG.warning("%s: %s%s", who, line, "; more of it is not told" * (count == _MOST_TOLD))
-        if client is not None:
-            notify(client, line, mistake=True)
 
     # The same in the thread that plays
 

@@ -15,8 +15,9 @@ from warp_torchrl.runs.config.options import PredictionOptions
 from warp_torchrl.world.air.fields import WeatherFields
 from warp_torchrl.world.air.files import minutes_in, read_any
 from warp_torchrl.world.air.folder import rasters_of
+from warp_torchrl.world.air.options import WeatherOptions
 from warp_torchrl.world.air.points import window_of
-from warp_torchrl.world.air.sunlight import Sunlight, by_sunlight
+from warp_torchrl.world.air.sunlight import Sunlight, Sunlit, by_sunlight
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.ignition.file import read_ignition, read_ignition_times
 from warp_torchrl.world.law.rate import RateFire
@@ -71,7 +72,9 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
     lit = torch.as_tensor(read_ignition(str(options.ignition), place.grid))
     rows, columns = slice(corner[0], corner[0] + height), slice(corner[1], corner[1] + width)
     convergence = _convergence(place, (height, width)) if options.true_north else 0.0
-    weather, by_place = _weather(options, place, (height, width), convergence)
+    weather, by_place = _weather(options, window_of(place.grid, place.corner, (height, width)), convergence)
+    if options.gusts:
+        options.gustiness.check(weather)
     start, lit, later = _started(options, place.grid, lit)
     closed = None
     if options.barriers is not None:
@@ -80,7 +83,7 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
     told, sunlight = None, None
     middle = _middle(place, (height, width))
     if options.moisture == "fosberg":
-        weather, sunlight = _sunlit(weather, fire, by_place, middle)
+        weather, by_place, sunlight = _sunlit(weather, fire, by_place, middle)
     if options.season == "date":
         fire, weather, told = _season(ground, middle, start)(fire, weather)
     return Case(
@@ -125,31 +128,27 @@ def _started(options: PredictionOptions, grid: Grid, lit: Tensor) -> tuple[float
     return start, since <= _MINUTE, torch.where(since > _MINUTE, since, torch.inf)
 
 
-def _weather(
-    options: PredictionOptions, place: MapPlace, size: tuple[int, int], convergence: float
-) -> tuple[WeatherTable, WeatherFields | None]:
+def _weather(options: PredictionOptions, window: Grid, convergence: float) -> tuple[WeatherTable, WeatherFields | None]:
     """Return the weather by the hour, and by place where it is a folder of rasters or a netCDF file."""
-    asked = (*["wind_gust"] * options.gusts, *["cloud"] * (options.moisture == "fosberg"))
-    how: dict[str, Any] = {
-        "wind_height": options.wind_height,
-        "start_ffmc": options.start_ffmc,
-        "bui": options.bui,
-        "units": options.units,
-        "asked": asked,
-    }
-    return read_any(str(options.weather), place.grid, place.corner, size, convergence, **how)
+    how = WeatherOptions(
+        wind_height=options.wind_height,
+        units=options.units,
+        start_ffmc=options.start_ffmc,
+        bui=options.bui,
+        asked=(*["wind_gust"] * options.gusts, *["cloud"] * (options.moisture == "fosberg")),
+        convergence=convergence,
+    )
+    return read_any(str(options.weather), window, how)
 
 
 def _sunlit(
     weather: WeatherTable, fire: RateFire, fields: WeatherFields | None, middle: tuple[float, float] | None
-) -> tuple[WeatherTable, list[Sunlight]]:
+) -> Sunlit:
     """Return the weather with the dead moistures of level ground, and how they differ by place."""
     if fire.bed.table is None:
         raise ValueError("moisture=fosberg is read by Rothermel's fuels, fbfm13 and fbfm40, got fire.model=fbp")
-    if fields is not None:
-        raise ValueError("moisture=fosberg is read with a table of weather, got weather by place")
     latitude, longitude = middle or (0.0, None)
-    return by_sunlight(weather, longitude, in_south=latitude < 0.0)
+    return by_sunlight(weather, fields, longitude, in_south=latitude < 0.0)
 
 
 def _season(ground: Landscape, middle: tuple[float, float] | None, start: float) -> Season:

@@ -193,7 +193,7 @@ def predict(
     front = beside(ignition.cpu()) if is_seen else None
     who = Members.plain(fires) if members is None else members
     if gusts is not None:
-        _check_gusts(gusts, table)
+        gusts.check(table)
         met, who = gusts.blocks(met), replace(who, gusts=world_key(seed + torch.arange(fires)))
     order = who.by_pace()
     burning = who.part(order).fires(law, ground, met, cell_size, front, embers, in_paces=True, later=later)
@@ -283,11 +283,6 @@ def _check_numbers(fires: int, area: float | None, hours: float | None, seed: in
         raise ValueError(f"hours must be over 0 and at most 1e5, got {hours:g}")
     if not 0 <= seed <= _LARGEST_SEED:
         raise ValueError(f"seed must be in 0..2^62, got {seed}")
-
-
-def _check_gusts(gusts: Gusts, table: WeatherTable) -> None:
-    if gusts.factor is None and table.wind_gust is None:
-        raise ValueError("gusts needs a column of gusts in the weather, or gustiness.factor, got neither")
 
 
 def _check_times(start: float, convergence: float) -> None:

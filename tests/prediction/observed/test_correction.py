@@ -9,8 +9,12 @@ import torch
 from warp_torchrl.benchmark.twins import HiddenFire, perimeters, scene, twin_experiments
 from warp_torchrl.prediction.observed.correction import FORECASTS, Correction
 from warp_torchrl.prediction.observed.observation import Observation
+from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.ensemble.parameters import Deviations
+from warp_torchrl.world.fires.members import Members
+from warp_torchrl.world.fires.pieces import Gusts, gust_factors
 from warp_torchrl.world.fires.sightings import HotSpotSensor
+from warp_torchrl.world.fires.spell import Spell
 
 TIMES = (25.0, 45.0, 65.0, 85.0)
 UNKNOWN = Deviations(wind_speed=0.0, moisture=0.0)
@@ -119,3 +123,32 @@ def test_the_head_is_known_and_inside_its_interval_nine_times_of_ten():
     (row,) = twin_experiments(["rate, wind, moisture"], [100], 40)
     near, inside, of_rate = (int(row[name].split()[0]) for name in ("pace_near", "pace_in", "rate_in"))
     assert near >= 34 and inside >= 31 and of_rate >= 31 and row["crps"] <= 0.6
+
+
+def arrived(fire, members, period=(0.0, 30.0)):
+    key = world_key(torch.arange(len(members)))
+    return torch.cat(fire.burned(members, key, fire.lit, period, lambda arrival, _: arrival.clone()))
+
+
+def test_a_member_in_a_gust_is_one_of_that_wind():
+    fire, key = replace(scene(31), gusts=Gusts(factor=2.0, minutes=60.0)), world_key(torch.arange(4))
+    for begin in (0.0, 20.0):
+        # Twenty minutes on the draw is another one, of the block after the twenty that fit before it.
+        gust = gust_factors(key, Spell(torch.tensor([3.0, 0.0]), 30.0, gust=2.0, block=int(begin)))
+        values = torch.zeros(4, 4)
+        told = arrived(fire, replace(Members(values), gusts=key), (begin, begin + 30.0))
+        values[:, 1] = gust.log()
+        assert torch.equal(told, arrived(fire, Members(values), (begin, begin + 30.0))) and len(set(gust.tolist())) == 4
+    assert torch.equal(arrived(fire, Members.plain(4)), arrived(scene(31), Members.plain(4))), "the restart has none"
+
+
+@pytest.mark.slow
+def test_gusts_leave_the_rate_less_known():
+    fire, deviations = scene(41), replace(UNKNOWN, bearing=0.0, local=0.0)
+    seen = perimeters(truth(fire, 1.5, 0.0, 0, 65.0), *TIMES[:3])
+    widths = []
+    for gusts in (None, Gusts(factor=1.0), Gusts(factor=3.0, minutes=20.0)):
+        found = Correction(members=32, deviations=deviations)(replace(fire, gusts=gusts), seen)
+        low, *_, high = found.steps[-1].posterior["rate"]
+        widths.append(math.log(high / low))
+    assert widths[0] == widths[1] and widths[2] > 1.3 * widths[0]

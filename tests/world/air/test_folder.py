@@ -9,6 +9,8 @@ import torch
 from tests.world.rasters import write
 from warp_torchrl.world.air.fields import Field, Lattice
 from warp_torchrl.world.air.folder import read_folder
+from warp_torchrl.world.air.options import WeatherOptions
+from warp_torchrl.world.air.points import window_of
 from warp_torchrl.world.behaviour.moistures import MOISTURES
 from warp_torchrl.world.state.window import Window
 from warp_torchrl.world.terrain.layer import read_grid
@@ -30,8 +32,9 @@ def folder(tmp_path):
     return tmp_path
 
 
-def read(folder, **options):
-    return read_folder(folder, read_grid("fuel", folder / "fuel.tif"), units=UNIT, **options)
+def read(folder, corner=(0, 0), size=None, **options):
+    window = window_of(read_grid("fuel", folder / "fuel.tif"), corner, size)
+    return read_folder(folder, window, WeatherOptions(**{"units": UNIT, **options}))
 
 
 def here(found, row):
@@ -70,14 +73,15 @@ def test_an_ensembles_other_wind_turns_and_strengthens_the_field(folder):
 
 def test_rows_of_the_table_beside_say_when_and_what_no_raster_does(folder):
     (folder / "weather.csv").write_text("datetime,WS,WD,live_woody\n2024-07-01 12:00,1,0,77\n2024-07-01 15:00,1,0,77\n")
-    found = read_folder(folder, read_grid("fuel", folder / "fuel.tif"), units={"wind_speed": "m/s", "WS": "m/s"})
+    found = read(folder, units={"wind_speed": "m/s", "WS": "m/s"})
     assert found.table.hours.tolist() == [0.0, 3.0] and found.table.live_woody.tolist() == [77.0, 77.0]
-    assert found.table.wind_speed.tolist() == pytest.approx([5.5, 8.0])  # of the rasters
+    speeds = found.table.wind_speed.tolist()  # of the rasters; between 350 and 10 degrees it is a little weaker
+    assert speeds[0] == pytest.approx(5.5) and speeds[1] == pytest.approx(8.0, rel=0.005)
     assert float(found.table.wind_bearing[0]) == pytest.approx(270.0)
 
 
 def test_wind_in_miles_an_hour_is_at_20_feet_and_bearings_are_from_true_north(folder):
-    found = read_folder(folder, read_grid("fuel", folder / "fuel.tif"), units={"wind_speed": "mph"}, convergence=90.0)
+    found = read(folder, units={"wind_speed": "mph"}, convergence=90.0)
     u, v = found.fields.wind[0, :, 0, 0]
     assert float(v) == pytest.approx(4.0 * 0.44704 * 1.15, rel=1e-5) and abs(float(u)) < 1e-5  # from grid south
     assert float(found.table.wind_bearing[0]) == pytest.approx(270.0, abs=1e-3)
@@ -95,6 +99,19 @@ def test_a_part_of_the_map_has_the_weather_of_the_whole_to_the_bit():
     whole = field.here(wind, moisture, Window.whole((15, 300)))
     part = field.here(wind, moisture, Window(3, 64, 7, 128, (15, 300)))
     assert torch.equal(part[0], whole[0][:, :, 3:10, 64:192]) and torch.equal(part[1], whole[1][:, 3:10, 64:192])
+
+
+def test_a_map_smaller_than_a_cell_of_the_weather_has_the_wind_between_the_middles_about_it(folder):
+    # Middles of 2 km at x of -1600, 400 and 2400 m: u = 8 + 4 (x - 400) / 2000; columns 0 and 15 lie at 25 and 775 m.
+    wide = {"cell": 2000.0, "crs": "EPSG:32631", "west": 5e5 - 2600.0}
+    write(folder / "a_ws.tif", [[4.0, 8.0, 12.0]] * 2, **wide)
+    write(folder / "a_wd.tif", [[270.0] * 3] * 2, **wide)
+    write(folder / "a_m1.tif", [[4.0, 8.0, 12.0]] * 2, **wide)
+    found = read(folder)
+    (u, _), moisture = here(found, 0)
+    torch.testing.assert_close(u[5, [0, 7, 15]], torch.tensor([7.25, 7.95, 8.75]))
+    torch.testing.assert_close(moisture[5, [0, 7, 15], 0], torch.tensor([7.25, 7.95, 8.75]))
+    assert float(found.table.wind_speed[0]) == pytest.approx(8.0)
 
 
 def broken(folder, name):
@@ -120,4 +137,4 @@ def test_what_does_not_fit_is_refused(folder, change, message):
 
 def test_a_unit_that_no_file_states_is_asked_for(folder):
     with pytest.raises(ValueError, match=r"a_ws.tif must name its unit .* units.wind_speed=mph"):
-        read_folder(folder, read_grid("fuel", folder / "fuel.tif"))
+        read(folder, units={})

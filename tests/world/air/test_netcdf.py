@@ -9,6 +9,8 @@ import torch
 from tests.world.rasters import rasterio, write
 from warp_torchrl.world.air.folder import read_folder
 from warp_torchrl.world.air.netcdf import netcdf_minutes, read_netcdf
+from warp_torchrl.world.air.options import WeatherOptions
+from warp_torchrl.world.air.sunlight import by_sunlight
 from warp_torchrl.world.behaviour.moistures import MOISTURES
 from warp_torchrl.world.state.window import Window
 from warp_torchrl.world.terrain.crs import project, stated_crs
@@ -31,8 +33,8 @@ LAMBERT = {
 }
 
 
-def utm(cell):
-    return {"cell": None, "crs": "EPSG:32631", "transform": rasterio.Affine(cell, 0.0, 5e5, 0.0, -cell, 5.5e6)}
+def utm(cell, west=5e5, north=5.5e6):
+    return {"cell": None, "crs": "EPSG:32631", "transform": rasterio.Affine(cell, 0.0, west, 0.0, -cell, north)}
 
 
 @pytest.fixture
@@ -81,6 +83,15 @@ def test_era5_gives_wind_moistures_and_times(tmp_path, grid):
     assert table.live_woody is None and bool(fields.moisture[:, list(MOISTURES).index("bui")].isnan().all())
 
 
+def test_fosbergs_tables_take_the_air_by_place(tmp_path, grid):
+    # 86 F and 29 %: reference 4; in July at noon, at 3 degrees east, 0 more on level ground. Then it rains.
+    told = {**ERA5, "tp": (np.array([0.0, 0.001])[:, None, None], {"units": "m"})}
+    table, fields, sunlight = by_sunlight(*read_netcdf(degrees(tmp_path / "a.nc", **told), grid), longitude=3.0)
+    assert fields.air[0, :, 0, 0].tolist() == pytest.approx([30.0, 28.93, 0.0], abs=0.01)
+    assert fields.moisture[0, :3, 0, 0].tolist() == [4.0, 5.0, 6.0] and table.dead_1h.tolist() == [4.0, 35.0]
+    assert sunlight[0].dry.all() and not sunlight[1].dry.any()
+
+
 def test_longitudes_to_360_and_rows_from_the_south_lie_where_they_are(tmp_path, grid):
     rising = np.arange(49.0, 50.6, 0.25)[:, None] * np.ones(9)  # wind of the latitude, in tenths
     told = {"u10": (rising / 10.0, {"units": "m/s"}), "v10": (0.0, {"units": "m/s"})}
@@ -88,12 +99,13 @@ def test_longitudes_to_360_and_rows_from_the_south_lie_where_they_are(tmp_path, 
     assert table.wind_speed[0] == pytest.approx(4.965, abs=0.003)  # 5,500,000 m north is 49.65 degrees
 
 
-def test_a_projected_file_is_as_a_folder_of_rasters_on_its_grid(tmp_path, grid):
+@pytest.mark.parametrize("cell, west, north", [(200.0, 5e5, 5.5e6), (2000.0, 5e5 - 2600.0, 5.5e6 + 2600.0)])
+def test_a_projected_file_is_as_a_folder_of_rasters_on_its_grid(tmp_path, grid, cell, west, north):
     east = np.arange(4.0) * np.ones((3, 1))
     stacked = np.stack((4.0 + east, 8.0 - east), axis=2)
     for name, values in (("u", stacked), ("v", -stacked)):
-        write(tmp_path / f"{name}.tif", values, **utm(200.0))
-    x, y = 5e5 + 100.0 + 200.0 * np.arange(4), 5.5e6 - 100.0 - 200.0 * np.arange(3)
+        write(tmp_path / f"{name}.tif", values, **utm(cell, west, north))
+    x, y = west + cell * (0.5 + np.arange(4)), north - cell * (0.5 + np.arange(3))
     fields = {
         name: (("time", "y", "x"), sign * stacked.transpose(2, 0, 1), {"units": "m/s", "grid_mapping": "crs"})
         for name, sign in (("u10", 1.0), ("v10", -1.0))
@@ -104,7 +116,7 @@ def test_a_projected_file_is_as_a_folder_of_rasters_on_its_grid(tmp_path, grid):
         told[axis].attrs = {"units": "km", "standard_name": f"projection_{axis}_coordinate"}
     told.to_netcdf(tmp_path / "wind.nc")
     one = read_netcdf(tmp_path / "wind.nc", grid)
-    other = read_folder(tmp_path, grid, units={"wind_speed": "m/s"})
+    other = read_folder(tmp_path, grid, WeatherOptions(units={"wind_speed": "m/s"}))
     winds = [found.fields.at(1).here(found.fields.means[0][1:], torch.ones(1, 7), MAP)[0] for found in (one, other)]
     torch.testing.assert_close(*winds, atol=1e-4, rtol=0)
     assert one.table.wind_bearing.tolist() == pytest.approx(other.table.wind_bearing.tolist())

@@ -5,10 +5,13 @@ import math
 import torch
 
 from tests.world.backends.test_growing import land, lit, on_whole_map, turning
+from warp_torchrl.world.air.fields import Lattice, WeatherFields
+from warp_torchrl.world.air.sunlight import Sunlight
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.fires import alone, fastest
 from warp_torchrl.world.fires.alone import Fires
 from warp_torchrl.world.fires.fastest import RowsOfMap
+from warp_torchrl.world.fires.spell import Spell, spread_in
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state import window
 from warp_torchrl.world.state.window import Window
@@ -34,6 +37,25 @@ def test_small_maps_and_those_with_little_fuel_are_asked_as_a_whole(monkeypatch)
     assert RowsOfMap.of(land(3, (90, 128)), torch.ones(90, 128, dtype=torch.bool), 30.0) is None, "1,920 of 4,096"
     monkeypatch.setattr(fastest, "_LEAST_FUEL", 1000)
     assert RowsOfMap.of(land(3, (90, 128)), torch.ones(90, 128, dtype=torch.bool), 30.0) is not None
+
+
+def test_rows_have_the_weather_and_the_sunlight_of_their_place(monkeypatch):
+    monkeypatch.setattr(fastest, "_ASKED", 2000)
+    monkeypatch.setattr(fastest, "_LEAST_FUEL", 10)
+    law, size = RateFire(model="fbfm40"), (90, 128)
+    hills = land(3, size).with_layers(fuel=torch.full((1, *size), 102, dtype=torch.int16))
+    level = torch.tensor([[4.0, 8.0], [20.0, 35.0]])
+    dead = torch.stack((level, level + 1.0, level + 2.0, *level.new_full((4, 2, 2), torch.nan)))
+    wind = torch.tensor([[3.0, 4.0], [5.0, 6.0]]).expand(1, 2, 2, 2)
+    field = WeatherFields(Lattice((0.0, 89.0), (0.0, 127.0)), wind, dead[None]).at(0)
+    mean = level.mean()
+    fine = mean + torch.tensor([0.0, 2.0, 3.0])[:, None] * torch.arange(4.0)
+    sunlight = Sunlight(fine, mean, dry=torch.tensor([[1.0, 1.0], [1.0, 0.0]]))
+    row = torch.stack((mean, mean + 1.0, mean + 2.0, *torch.tensor([60.0, 90.0, 90.0, 60.0])))
+    spell = Spell(wind.mean((0, 2, 3)), 60.0, row, field=field, sunlight=sunlight)
+    rows = RowsOfMap.of(hills, torch.ones(size, dtype=torch.bool), 30.0)
+    whole = spread_in(law, hills, 30.0, spell).head[0]
+    assert torch.equal(rows.head(law, spell, 30.0), whole[torch.arange(3, 90, 6)]) and len(whole.unique()) > 1000
 
 
 def test_fires_of_large_maps_come_to_the_times_of_the_whole_map_to_the_bit(monkeypatch):

@@ -149,13 +149,15 @@ class _Run:
         tick = 1 + 2 * len(self.steps)
         values = self._posterior.drawn(self._key, tick, self._correction.shrinkage)
         local = self._correction.deviations.local
-        self.members = Members(values).by_sector(self._key, tick, local, held, sectors_about(burned))
+        members = Members(values).by_sector(self._key, tick, local, held, sectors_about(burned))
+        self.members = scene.gusting(members, self._key)
         learned = self._learned()
         self.steps.append(Step(seen.minutes, front.minutes, seen.kind, scores, learned, float(held.mean()), burned))
 
     def _prior(self) -> Members:
         """Return members that learned nothing, on the fire as it was last seen."""
-        return Members.drawn(self._key, self._correction.deviations, self.known)
+        members = Members.drawn(self._key, self._correction.deviations, self.known)
+        return self._scene.gusting(members, self._key)
 
     def _learned(self) -> dict[str, list[float]]:
         """Return quantiles of the parameters, and of the pace of heads."""

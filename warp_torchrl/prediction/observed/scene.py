@@ -1,7 +1,8 @@
 """A fire and its weather, and what its members reach between two times."""
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol, TypeVar
 
@@ -11,6 +12,7 @@ from torch import Tensor
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.fires.alone import Burned, on_map
 from warp_torchrl.world.fires.members import Members
+from warp_torchrl.world.fires.pieces import Gusts
 from warp_torchrl.world.fires.sightings import beside
 from warp_torchrl.world.fires.spell import Spell, can_ignite, spells_of
 from warp_torchrl.world.law.rate import RateFire
@@ -38,6 +40,7 @@ class Scene:
         air: The weather.
         start: When the fires start, since the weather's first row began [minutes].
         lit: Where they start, bool [H, W].
+        gusts: How members draw their winds about the mean; None: they have the mean wind.
     """
 
     ground: Landscape
@@ -46,6 +49,7 @@ class Scene:
     air: Weather
     start: float
     lit: Tensor
+    gusts: Gusts | None = None
 
     @cached_property
     def law(self) -> RateFire:
@@ -58,8 +62,12 @@ class Scene:
         return can_ignite(self.law, self.ground)
 
     def spells(self, begin: float, end: float) -> list[Spell]:
-        """Return the weather between two times since the start [minutes]."""
+        """Return the weather between two times since the start [minutes], of the mean wind."""
         return spells_of(self.air, end - begin, self.start + begin)
+
+    def gusting(self, members: Members, key: Tensor) -> Members:
+        """Return members that draw their winds by keys, int64 [K], where there are gusts."""
+        return members if self.gusts is None else replace(members, gusts=key)
 
     def edge(self, known: Tensor) -> Tensor:
         """Return the cells along the front of what has burned that can burn, bool [H, W]."""
@@ -83,7 +91,10 @@ class Scene:
             none[:, lit] = 0.0
             return [keep(none, members)]
         half_way = beside(lit) if begin > 0.0 else None
-        fires = members.open.fires(self.law, self.ground, self.spells(begin, end), self.cell_size, half_way)
+        spells = self.spells(begin, end)
+        if self.gusts is not None and members.gusts is not None:
+            spells = self.gusts.blocks(spells, math.ceil(begin))  # a draw is a minute long at least
+        fires = members.open.fires(self.law, self.ground, spells, self.cell_size, half_way)
 
         def reached(part: Burned) -> Tensor:
             found = on_map(part)

@@ -203,8 +203,6 @@ class PredictionOptions:
             raise ValueError("firebrands is read with embers=true, got embers=false")
         if self.gustiness != Gusts() and not self.gusts:
             raise ValueError("gustiness is read with gusts=true, got gusts=false")
-        if self.gusts and self.observed is not None:
-            raise ValueError("gusts must be false with observed=FILE, whose corrections know the mean wind, got true")
         read = {"rate": Deviations(rate=self.members.rate), "all": self.members, "none": Deviations()}
         if self.observed is None and self.members != read[self.uncertain]:
             what = "members" if self.uncertain == "none" else "members but members.rate"

@@ -75,11 +75,14 @@ class WeatherFields:
         wind: (u east, v north) of the air's motion at 10 m, float32 [T, 2, h, w] [m/s].
         moisture: In the order of ``MOISTURES``, float32 [T, 7, h, w] [%]; a row and kind that is not known by place is
             NaN.
+        air: Temperature [C], relative humidity [%], and 1 where rain falls, else 0, float32 [T, 3, h, w]; None where
+            they are not known by place.
     """
 
     lattice: Lattice
     wind: Tensor
     moisture: Tensor
+    air: Tensor | None = None
 
     @property
     def means(self) -> tuple[Tensor, Tensor]:

@@ -2,37 +2,30 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from warp_torchrl.world.air.fields import WeatherFields
 from warp_torchrl.world.air.folder import TABLE, read_folder
 from warp_torchrl.world.air.netcdf import is_netcdf, netcdf_minutes, read_netcdf
+from warp_torchrl.world.air.options import WeatherOptions
 from warp_torchrl.world.terrain.grid import Grid
-from warp_torchrl.world.weather.table import WeatherTable, minutes_until, read_weather
+from warp_torchrl.world.weather.table import WeatherTable, minutes_until
 
 
-def read_any(
-    weather: str, grid: Grid, corner: tuple[int, int], size: tuple[int, int], convergence: float, **options: Any
-) -> tuple[WeatherTable, WeatherFields | None]:
+def read_any(weather: str, window: Grid, options: WeatherOptions) -> tuple[WeatherTable, WeatherFields | None]:
     """Return the weather by the hour, and by place where it is a folder of rasters or a netCDF file.
 
     Args:
         weather: The file or folder, or ``august``.
-        grid: The grid that the map is a window of.
-        corner: (row, column) of the window.
-        size: (rows, columns) of the window.
-        convergence: Angle from true north to the grid's north, clockwise [degrees].
-        **options: Those of ``read_weather``.
+        window: The map.
+        options: How it is read.
 
     Raises:
         ValueError: If it cannot be read or does not fit.
     """
     path = Path(weather)
     if path.is_dir():
-        return read_folder(path, grid, corner, size, convergence=convergence, **options)
-    if is_netcdf(path):
-        return read_netcdf(path, grid, corner, size, convergence=convergence, **options)
-    return read_weather(weather, **options), None
+        return read_folder(path, window, options)
+    return read_netcdf(path, window, options) if is_netcdf(path) else (options.table(weather), None)
 
 
 def minutes_in(

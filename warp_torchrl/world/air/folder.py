@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +12,14 @@ from torch import Tensor
 from warp_torchrl.system.provenance import Provenance, report_file
 from warp_torchrl.world.air.fields import WeatherFields
 from warp_torchrl.world.air.gridded import STRONGEST
-from warp_torchrl.world.air.points import PlacedWeather, points_over, put, window_of, with_means
+from warp_torchrl.world.air.options import WeatherOptions
+from warp_torchrl.world.air.points import PlacedWeather, points_over, put, with_means
 from warp_torchrl.world.air.wind import turned
 from warp_torchrl.world.behaviour.moistures import MOISTURES
 from warp_torchrl.world.terrain.bands import DEGREES, SPEED_UNITS, factor_of
 from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.layer import RASTERS, Header, read_header, read_layer
-from warp_torchrl.world.weather.table import OPEN_10M_OVER_20FT, WeatherTable, WindHeight, read_weather
+from warp_torchrl.world.weather.table import OPEN_10M_OVER_20FT, WeatherTable, WindHeight
 
 TABLE = "weather.csv"
 """Table in the folder, of the same hours: it says when they are, and what no raster does."""
@@ -36,22 +37,11 @@ NAMES: Mapping[str, str] = {
     "bui": r"bui",
 }
 """Ends of the names of files, by what they hold: ``weather_ws.tif``, ``ws.tif``."""
+_AS_STATED = WeatherOptions()
 _PERCENT = dict.fromkeys(("%", "percent", "per cent"), 1.0)
 
 
-def read_folder(
-    folder: Path,
-    grid: Grid,
-    corner: tuple[int, int] = (0, 0),
-    size: tuple[int, int] | None = None,
-    *,
-    convergence: float = 0.0,
-    wind_height: WindHeight | None = None,
-    start_ffmc: float = 85.0,
-    bui: float | None = None,
-    units: Mapping[str, str] | None = None,
-    asked: Collection[str] = (),
-) -> PlacedWeather:
+def read_folder(folder: Path, window: Grid, options: WeatherOptions = _AS_STATED) -> PlacedWeather:
     """Return the weather of a folder of rasters over a map.
 
     Files are known by the ends of their names, ``NAMES``; each has a band an hour, or one for all hours. Speed and
@@ -59,25 +49,18 @@ def read_folder(
 
     Args:
         folder: The folder.
-        grid: The grid that the map is a window of.
-        corner: (row, column) of the window.
-        size: (rows, columns) of the window; None is the whole grid.
-        convergence: Angle from true north, of the bearings, to the grid's north, clockwise [degrees].
-        wind_height: Height of the wind; None takes 20ft for miles an hour, else 10m.
-        start_ffmc: See ``read_weather``, of the table of the folder.
-        bui: The same.
-        units: Unit of ``wind_speed`` where its file states none.
-        asked: See ``read_weather``.
+        window: The map.
+        options: Of the wind, and of the table of the folder.
 
     Raises:
         ValueError: If a file is missing, damaged, of other hours or another place, or a unit is not known.
     """
-    units, headers = units or {}, _headers(folder)
-    table = _table(folder, _count(folder, headers), wind_height, start_ffmc, bui, units, asked)
+    headers = _headers(folder)
+    table = _table(folder, _count(folder, headers), options)
     hours = _count(folder, headers) if table is None else len(table.hours)
-    points, lattice = points_over(window_of(grid, corner, size), [each.grid for each in headers.values()])
-    factor, height = _to_metres_a_second(headers, units, wind_height)
-    wind = _wind(headers, points, hours, factor, convergence)
+    points, lattice = points_over(window, [each.grid for each in headers.values()])
+    factor, height = _to_metres_a_second(headers, options.units, options.wind_height)
+    wind = _wind(headers, points, hours, factor, options.convergence)
     wind *= OPEN_10M_OVER_20FT if height == "20ft" else 1.0
     moisture = torch.full((hours, len(MOISTURES), *points.shape), math.nan)
     for index, name in enumerate(MOISTURES):
@@ -86,7 +69,7 @@ def read_folder(
             moisture[:, index] = _on(points, name, headers[name], hours)
     fields = WeatherFields(lattice, wind, moisture)
     _tell(headers, height)
-    return PlacedWeather(with_means(table, fields, convergence), fields)
+    return PlacedWeather(with_means(table, fields, options.convergence), fields)
 
 
 def _headers(folder: Path) -> dict[str, Header]:
@@ -183,20 +166,12 @@ def rasters_of(weather: str | Path) -> list[Path]:
     return [each.path for each in _headers(Path(weather)).values()] if Path(weather).is_dir() else []
 
 
-def _table(
-    folder: Path,
-    hours: int,
-    wind_height: WindHeight | None,
-    start_ffmc: float,
-    bui: float | None,
-    units: Mapping[str, str],
-    asked: Collection[str],
-) -> WeatherTable | None:
+def _table(folder: Path, hours: int, options: WeatherOptions) -> WeatherTable | None:
     """Return the folder's table, whose rows are the rasters' hours; None where it has none."""
     path = folder / TABLE
     if not path.is_file():
         return None
-    table = read_weather(path, wind_height=wind_height, start_ffmc=start_ffmc, bui=bui, units=units, asked=asked)
+    table = options.table(path)
     if hours not in (1, len(table.hours)):
         raise ValueError(f"{path} must have a row for each of the rasters' {hours} bands, got {len(table.hours)}")
     return table

@@ -14,7 +14,8 @@ from torch import Tensor
 from warp_torchrl.system.provenance import Provenance, report_file
 from warp_torchrl.world.air.fields import WeatherFields
 from warp_torchrl.world.air.netcdf_grid import Cells, cells_about
-from warp_torchrl.world.air.points import PlacedWeather, points_over, put, window_of, with_means
+from warp_torchrl.world.air.options import WeatherOptions
+from warp_torchrl.world.air.points import PlacedWeather, points_over, put, with_means
 from warp_torchrl.world.air.wind import turned
 from warp_torchrl.world.behaviour.moistures import MOISTURES
 from warp_torchrl.world.terrain.grid import Grid
@@ -29,8 +30,9 @@ from warp_torchrl.world.weather.table import OPEN_10M_OVER_20FT, WeatherTable, W
 from warp_torchrl.world.weather.units import unit_of
 
 ENDS = (".nc", ".nc4", ".cdf")
-_POINTS = 8
-"""Points over a map's shorter side at least: one cell of a reanalysis may be wider than the map."""
+_AS_STATED = WeatherOptions()
+_AIR = ("temperature", "humidity", "wet")
+"""What ``WeatherFields.air`` holds."""
 _TIMES = ("valid_time", "time")
 _OF_GRIB = {
     **{"10u": "wind_u", "10v": "wind_v", "si10": "wind_speed", "10si": "wind_speed"},
@@ -62,19 +64,7 @@ def is_netcdf(path: str | Path) -> bool:
     return Path(path).suffix.lower() in ENDS
 
 
-def read_netcdf(
-    path: Path,
-    grid: Grid,
-    corner: tuple[int, int] = (0, 0),
-    size: tuple[int, int] | None = None,
-    *,
-    convergence: float = 0.0,
-    wind_height: WindHeight | None = None,
-    start_ffmc: float = 85.0,
-    bui: float | None = None,
-    units: Mapping[str, str] | None = None,
-    asked: Collection[str] = (),
-) -> PlacedWeather:
+def read_netcdf(path: Path, window: Grid, options: WeatherOptions = _AS_STATED) -> PlacedWeather:
     """Return the weather of a netCDF file over a map, as ``air.folder.read_folder`` does of a folder.
 
     Variables are known by their names, as columns of a table, or by their standard names. Dead moistures follow from
@@ -82,32 +72,24 @@ def read_netcdf(
 
     Args:
         path: The file.
-        grid: The grid that the map is a window of.
-        corner: (row, column) of the window.
-        size: (rows, columns) of the window; None is the whole grid.
-        convergence: Angle from true north to the map's grid north, clockwise [degrees].
-        wind_height: Height of the wind; None takes 10m.
-        start_ffmc: Fine fuel moisture code an hour before the first, for a file without FFMC.
-        bui: Buildup index, for a file without it.
-        units: Unit by quantity or variable where the file states none.
-        asked: ``wind_gust``, ``cloud``: read too, where the file has them.
+        window: The map.
+        options: Of the wind, the units and the fuel's codes.
 
     Raises:
         ValueError: If xarray is missing, or the file cannot be read, lies elsewhere, or lacks the wind or a unit.
     """
-    window = window_of(grid, corner, size)
     with _opened(path) as dataset:
-        named = _variables(dataset, asked)
+        named = _variables(dataset, options.asked)
         cells = cells_about(dataset, next(iter(named.values())), window)
         texts = _times(dataset)
-        layers = {name: _layer(name, each, cells, len(texts), units or {}) for name, each in named.items()}
+        layers = {name: _layer(name, each, cells, len(texts), options.units) for name, each in named.items()}
     clock = dated_clock(texts, ("time",), None)
     hours = torch.tensor(clock.hours, dtype=torch.float32)
-    factor = OPEN_10M_OVER_20FT if wind_height == "20ft" else 1.0
+    factor = OPEN_10M_OVER_20FT if options.wind_height == "20ft" else 1.0
     values = {name: torch.from_numpy(each.values).float() for name, each in layers.items()}
-    turn = convergence - (_convergence(cells.grid) if any(each.from_grid for each in layers.values()) else 0.0)
-    known = _completed(values, hours, factor, start_ffmc)
-    points, lattice = points_over(window, [cells.grid], min(window.shape) // _POINTS)
+    turn = options.convergence - (_convergence(cells.grid) if any(each.from_grid for each in layers.values()) else 0.0)
+    known = _completed(values, hours, factor, options.start_ffmc)
+    points, lattice = points_over(window, [cells.grid])
 
     def placed(name: str) -> Tensor:
         each = known[name].double().numpy()
@@ -117,16 +99,17 @@ def read_netcdf(
     wind = turned(torch.stack((placed("wind_u"), placed("wind_v")), dim=1), torch.deg2rad(torch.tensor([turn])))
     unknown = torch.full((len(hours), *points.shape), math.nan)
     moisture = torch.stack([placed(name) if name in known else unknown for name in MOISTURES], dim=1)
-    fields = WeatherFields(lattice, wind * factor, moisture)
+    air = torch.stack([placed(name) for name in _AIR], dim=1) if "wet" in known else None
+    fields = WeatherFields(lattice, wind * factor, moisture, air)
     means = {name: placed(name).mean((1, 2)) for name in ("temperature", "humidity", "rain", *ASKED) if name in known}
     if "wind_gust" in means:
         means["wind_gust"] = means["wind_gust"] * factor
-    means |= {} if bui is None else {"bui": torch.full_like(hours, bui)}
+    means |= {} if options.bui is None else {"bui": torch.full_like(hours, options.bui)}
     began = next(iter(clock.moments.values()))[0]
     still = torch.zeros_like(hours)
     table = WeatherTable(hours=hours, wind_speed=still, wind_bearing=still, began=began, zone=0.0, **means)  # type: ignore[arg-type]
-    _tell(path, layers, wind_height or "10m")
-    return PlacedWeather(with_means(table, fields, convergence), fields)
+    _tell(path, layers, options.wind_height or "10m")
+    return PlacedWeather(with_means(table, fields, options.convergence), fields)
 
 
 def netcdf_minutes(moment: str, path: str | Path, name: str = "start") -> float:
@@ -238,7 +221,8 @@ def _completed(known: dict[str, Tensor], hours: Tensor, factor: float, start_ffm
     if not {"temperature", "humidity"} <= known.keys():
         return known
     air, rain = (known["temperature"], known["humidity"]), known.get("rain")
-    dead = dict(zip(("dead_1h", "dead_10h", "dead_100h"), dead_moisture(*air, rain), strict=True))
+    falls = torch.zeros_like(air[0]) if rain is None else torch.where(rain.isnan(), rain, (rain > 0.0).float())
+    dead = {"wet": falls} | dict(zip(("dead_1h", "dead_10h", "dead_100h"), dead_moisture(*air, rain), strict=True))
     if rain is not None and "ffmc" not in known:
         speed = torch.hypot(known["wind_u"], known["wind_v"]) * factor
         code, codes = torch.full_like(rain[0], start_ffmc), []

@@ -14,6 +14,8 @@ from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.resampling import fill, project_bounds, resample
 from warp_torchrl.world.weather.table import WeatherTable
 
+_POINTS = 8
+"""Points over a map's shorter side at least: one cell of a reanalysis may be wider than the map."""
 _MOST_UNKNOWN = 0.25  # share of the points over a map
 
 
@@ -31,16 +33,19 @@ def window_of(grid: Grid, corner: tuple[int, int], size: tuple[int, int] | None)
     return Grid(grid.shape if size is None else size, grid.crs, place)
 
 
-def points_over(window: Grid, grids: Sequence[Grid], farthest: int | None = None) -> tuple[Grid, Lattice]:
-    """Return points over a map, as far apart as the cells of the finest of some grids.
+def points_over(window: Grid, grids: Sequence[Grid]) -> tuple[Grid, Lattice]:
+    """Return points over a map, as far apart as the cells of the finest of some grids, and ``_POINTS`` at least.
+
+    The first lie half a step inside the map. Without the least number that is half a cell of the weather, which on a
+    map smaller than such a cell is outside of it.
 
     Args:
         window: The map.
         grids: The grids.
-        farthest: How many of the map's cells they are apart at most; None: as many as it takes.
     """
     joined = min(max(1, round(_cells_to_one(each, window))) for each in grids)
-    joined = joined if farthest is None else min(joined, max(1, farthest))
+    if window.is_on_earth:  # else nothing is interpolated
+        joined = min(joined, max(1, min(window.shape) // _POINTS))
     rows, columns = (max(2, math.ceil(each / joined)) for each in window.shape)
     a, b, left, d, e, top = window.transform[:6]
     place = type(window.transform)(a * joined, b * joined, left, d * joined, e * joined, top)

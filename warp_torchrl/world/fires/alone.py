@@ -1,9 +1,7 @@
 """Fires without vehicles under law ``rate``: many on one map, in hourly weather, from ignition to an end."""
 
 import threading
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TypeVar
@@ -11,13 +9,14 @@ from typing import TypeVar
 import torch
 from torch import Tensor
 
-from warp_torchrl.system import memory
 from warp_torchrl.world.backends.growing import Embers, GrowingFires, Land, SpellInWindows
 from warp_torchrl.world.backends.spells import PlanesOfSpells, in_window, strips
 from warp_torchrl.world.backends.spreading import Hour
 from warp_torchrl.world.behaviour.firebrands import Firebrands
 from warp_torchrl.world.fires.fastest import RowsOfMap, fastest_heads, heads_of_strips
 from warp_torchrl.world.fires.later import LaterFires
+from warp_torchrl.world.fires.paces import drawn_paces, rates_in
+from warp_torchrl.world.fires.parts import Division, Ended, check_memory
 from warp_torchrl.world.fires.pieces import from_ignition
 from warp_torchrl.world.fires.spell import Spell, air_in, can_ignite, heads, spread_in, ticks_of
 from warp_torchrl.world.fires.spotting import EmberGround, SpotFires
@@ -28,9 +27,6 @@ from warp_torchrl.world.state.window import Window
 
 AT_ONCE = 64
 """Fires that burn at once at most, whose planes a CPU's cache holds."""
-_MOST_CELLS = 2**24  # of the windows of fires that burn at once
-_BYTES_A_FIRE, _BYTES_A_CELL = 64, 200  # that a cell of a window takes at most, for each fire and for the map
-_BYTES_OF_GROUP = 96  # that a cell takes for the planes of each group
 _HEAD = 3  # planes of travel; then head, backing, intensity and flame length, and the kind of fire where crowns burn
 T = TypeVar("T")
 
@@ -200,7 +196,8 @@ class Fires:
             later = torch.where(self.fuel, self.later, torch.inf)
             embers = LaterFires(later, len(key), embers)
             about = lit if bool(lit.any()) else later.isfinite()
-        fires = GrowingFires(lit, len(key), land, most, partial(self._check, len(key)), about)
+        fits = partial(check_memory, fires=len(key), groups=self.groups, workers=self.workers)
+        fires = GrowingFires(lit, len(key), land, most, fits, about)
         fires.burn_spells((self._going(number) for number in range(len(self.spells))), embers)
         return Burned(fires.window, fires.arrival(), self.pace(key, fires.window), self)
 
@@ -216,49 +213,20 @@ class Fires:
         Raises:
             ValueError: If the window of one fire does not fit in memory.
         """
-        limit, each = [AT_ONCE], max(1, len(key) // len(self.laws))
+        each = max(1, len(key) // len(self.laws))
+        division = Division(each=each if self.beside else None, swift=self.swift)
 
-        def burned(part: slice) -> list[T]:
-            count = part.stop - part.start
-            try:
-                if count > limit[0]:
-                    raise _TooMany
-                begun = lit if lit.dim() == 2 else lit[part]
-                return [then(self.of(part, each).burn(begun, key[part], most))]
-            except _TooMany:
-                half = limit[0] = min(limit[0], -(-count // 2))
-                return [each for less in parts(part, half) for each in burned(less)]
-
-        def parts(whole: slice, size: int) -> Iterator[slice]:
-            """Yield parts of whole laws where some fit, else of one law each."""
-            if self.swift is not None:
-                return (less for like in _alike(self.swift, whole) for less in _parts(like, size))
-            if size >= each or not self.beside:
-                return _parts(whole, size - size % each if self.beside else size)
-            return (less for law in _parts(whole, each) for less in _parts(law, size))
+        def burned(part: slice) -> T:
+            return then(self.of(part, each).burn(lit if lit.dim() == 2 else lit[part], key[part], most))
 
         self._ended.clear()
-        workers = 1 if lit.is_cuda else self.workers
-        for found in _side_by_side(burned, parts(slice(0, len(key)), AT_ONCE), workers, self._ended):
-            yield from found
+        yield from division.each_part(burned, len(key), AT_ONCE, 1 if lit.is_cuda else self.workers, self._ended)
 
     def pace(self, key: Tensor, window: Window) -> Tensor:
         """Return the factor on the times of some fires in a window, float32 [b, h, w]."""
-        keys = key.chunk(len(self.laws))
-        paces = [
-            law.pace(each, self.size) if window.is_whole else law.pace_in(each, window)
-            for law, each in zip(self.laws, keys, strict=True)
-        ]
-        pace = paces[0] if len(paces) == 1 else torch.cat(paces)
-        pace = pace if self.rate is None else pace / self._rates(self.rate, window)
+        pace = drawn_paces(self.laws, key, window)
+        pace = pace if self.rate is None else pace / rates_in(self.rate, self.sector, window)
         return pace if self.half_way is None else torch.where(window.cut(self.half_way, False), 0.5 * pace, pace)
-
-    def _rates(self, rate: Tensor, window: Window) -> Tensor:
-        """Return the factor on the rates of each fire in a window, float32 [b, h, w] or [b, 1, 1]."""
-        if self.sector is None:
-            return rate[:, None, None]
-        place = window.cut(self.sector, 0)
-        return rate.index_select(1, place.flatten()).view(len(rate), *place.shape)
 
     def _ember_ground(self) -> EmberGround:
         """Return what firebrands fly over, by the first law."""
@@ -273,23 +241,8 @@ class Fires:
 
     def _going(self, number: int) -> SpellInWindows:
         if (self.root or self)._ended.is_set():
-            raise _Ended
+            raise Ended
         return self.spell(number)
-
-    def _check(self, fires: int, window: Window) -> None:
-        """Refuse a window that is too large for ``fires`` fires at once.
-
-        Raises:
-            _TooMany: If fewer fires may fit.
-            ValueError: If not even one fits.
-        """
-        groups = 0 if self.groups == 1 else self.groups * _BYTES_OF_GROUP
-        wanted = window.cells * (fires * _BYTES_A_FIRE + groups + _BYTES_A_CELL)
-        there = memory.available()
-        if fires > 1 and (fires * window.cells > _MOST_CELLS or wanted * self.workers > there):
-            raise _TooMany
-        if wanted > there:
-            raise memory.too_little(f"a fire in a window of {window.height} x {window.width} cells", wanted, there)
 
     def _planes(self, number: int, window: Window) -> Tensor:
         """Return the planes of each group, float32 [G 7, h, w], or G 8."""
@@ -352,52 +305,3 @@ def on_map(burned: Burned) -> Tensor:
         return burned.minutes.clone()
     plane = burned.minutes.new_full((len(burned.minutes), *burned.window.map), NEVER)
     return burned.window.put(burned.minutes, plane)
-
-
-class _TooMany(Exception):  # noqa: N818
-    """Too many fires to burn at once in their window."""
-
-
-class _Ended(Exception):  # noqa: N818
-    """Other threads have ended the work."""
-
-
-def _parts(whole: slice, size: int) -> Iterator[slice]:
-    """Yield ``size`` fires at a time."""
-    begins = range(whole.start, whole.stop, size)
-    yield from (slice(begin, min(begin + size, whole.stop)) for begin in begins)
-
-
-def _alike(swift: Tensor, whole: slice) -> Iterator[slice]:
-    """Yield the runs of fires that take the same ticks."""
-    begin = whole.start
-    for count in swift[whole].unique_consecutive(return_counts=True)[1].tolist():
-        yield slice(begin, begin + count)
-        begin += count
-
-
-def _side_by_side(
-    function: Callable[[slice], T],
-    parts: Iterable[slice],
-    workers: int,
-    ended: threading.Event,
-) -> Iterator[T]:
-    """Yield a function of each part, in order, computed by ``workers`` threads; an event ends it early.
-
-    Few operations of a fire are large enough for torch's own threads, so each fire takes one thread.
-    """
-    if workers == 1:
-        yield from map(function, parts)
-        return
-    waiting: deque[Future[T]] = deque()
-    with ThreadPoolExecutor(workers, initializer=torch.set_num_threads, initargs=(1,)) as pool:
-        try:
-            for part in parts:
-                waiting.append(pool.submit(function, part))
-                if len(waiting) > workers:
-                    yield waiting.popleft().result()
-            while waiting:
-                yield waiting.popleft().result()
-        finally:
-            ended.set()  # after an error, an interruption, or who asked has had enough
-            pool.shutdown(wait=False, cancel_futures=True)

@@ -53,7 +53,8 @@ class RowsOfMap:
         else:
             each = [spell.here(wind, moisture, window) for window in self.windows]
             air, moisture = torch.cat([one[0] for one in each], dim=2), torch.cat([one[1] for one in each], dim=1)
-        moisture = in_sun(spell, moisture, self.ground, self.rise)
+        levels = [level for window in self.windows if (level := spell.level(window)) is not None]
+        moisture = in_sun(spell, moisture, self.ground, self.rise, torch.cat(levels) if levels else None)
         return fire.bed.spread(self.ground, bent(air, self.ground), moisture, cell_size, self.rise).head[0]
 
 

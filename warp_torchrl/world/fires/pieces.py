@@ -11,6 +11,7 @@ from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.random import Stream, normal
 from warp_torchrl.world.behaviour.acceleration import YOUNG
 from warp_torchrl.world.fires.spell import Spell
+from warp_torchrl.world.weather.table import WeatherTable
 
 _AGES = (5.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 180.0, YOUNG)
 """Minutes since ignition between which a young fire's rates are constant, at their mean."""
@@ -41,13 +42,27 @@ class Gusts:
     def __post_init__(self) -> None:
         check_fields(self, minutes=(1.0, 1440.0), factor=(1.0, 5.0))
 
-    def blocks(self, spells: Sequence[Spell]) -> list[Spell]:
-        """Return spells cut into the times of draws, where there are gusts."""
+    def check(self, table: WeatherTable) -> None:
+        """Refuse a weather without gusts where no factor is given.
+
+        Raises:
+            ValueError: If so.
+        """
+        if self.factor is None and table.wind_gust is None:
+            raise ValueError("gusts needs a column of gusts in the weather, or gustiness.factor, got neither")
+
+    def blocks(self, spells: Sequence[Spell], first: int = 0) -> list[Spell]:
+        """Return spells cut into the times of draws, where there are gusts.
+
+        Args:
+            spells: The weather.
+            first: Number of the first block; other numbers are other draws.
+        """
         made: list[Spell] = []
         for spell in spells:
             gust = spell.gust if self.factor is None else self.factor
             parts = _cut(spell, self._ends(spell.minutes) if gust > 1.0 else ())
-            before = len(made)
+            before = first + len(made)
             made += [replace(part, gust=gust, block=before + number) for number, part in enumerate(parts)]
         return made
 

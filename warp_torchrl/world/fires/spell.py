@@ -22,6 +22,7 @@ from warp_torchrl.world.state.window import Window
 BUT_FASTEST = 0.999
 """Share of the cells whose rates set the ticks."""
 _SPREAD_AT_ONCE = 2**20  # cells of groups whose rates are computed at once
+_DEAD = 3  # moistures of dead fuel, the first of ``MOISTURES``
 _LEAST_TICKS = 4  # of a spell: the fire's edge follows from the times of the tick before
 
 
@@ -54,6 +55,17 @@ class Spell:
         """
         return (wind[:, :, None, None], moisture) if self.field is None else self.field.here(wind, moisture, window)
 
+    def level(self, window: Window) -> Tensor | None:
+        """Return the dead moistures of level ground in a window over their means, and how far it is dry.
+
+        Returns:
+            float32 [h, w, 4], see ``Sunlight.factors``; None where they are one everywhere.
+        """
+        if self.field is None or self.sunlight is None or self.sunlight.dry is None:
+            return None
+        planes = torch.cat((self.field.moisture[:_DEAD], self.sunlight.dry[None]))
+        return self.field.lattice.at(planes, window).movedim(0, -1)
+
     def of(self, groups: slice) -> "Spell":
         """Return the weather of some groups."""
         if self.wind.dim() == 1:
@@ -85,8 +97,11 @@ def spread_in(
         rise = gradient(landscape.elevation, landscape.cover, cell_size)
     at_once = max(1, _SPREAD_AT_ONCE // ground.cover.numel())
     place = Window.whole((landscape.cover.shape[1], landscape.cover.shape[2])) if window is None else window
+    level = spell.level(place)
     parts = [
-        fire.bed.spread(ground, bent(air, ground), in_sun(spell, moist, ground, rise), cell_size, rise, spell.young)
+        fire.bed.spread(
+            ground, bent(air, ground), in_sun(spell, moist, ground, rise, level), cell_size, rise, spell.young
+        )
         for air, moist in (
             spell.here(*each, place) for each in zip(winds.split(at_once), moistures.split(at_once), strict=True)
         )
@@ -102,7 +117,8 @@ def air_in(
     moistures = in_force(spell.moisture, row).reshape(-1, len(row)).expand(len(winds), -1)
     air, moist = spell.here(winds, moistures, window)
     if spell.sunlight is not None:
-        moist = in_sun(spell, moist, window.landscape(landscape), rise_of(landscape, window, cell_size))
+        rise, level = rise_of(landscape, window, cell_size), spell.level(window)
+        moist = in_sun(spell, moist, window.landscape(landscape), rise, level)
     return (air if landscape.layer(FACTORS[0]) is None else bent(air, window.landscape(landscape))), moist
 
 
@@ -122,12 +138,14 @@ def heads(spread: Spread, with_kind: bool = False) -> Tensor:
     return torch.stack((then.head, then.backing, then.intensity, then.flame_length, *kind), dim=1)
 
 
-def in_sun(spell: Spell, moisture: Tensor, ground: Landscape, rise: Tensor | None) -> Tensor:
-    """Return moistures [G, 7] or [G, h, w, 7] by aspect, slope and shade, [G, h, w, 7]."""
+def in_sun(
+    spell: Spell, moisture: Tensor, ground: Landscape, rise: Tensor | None, level: Tensor | None = None
+) -> Tensor:
+    """Return moistures [G, 7] or [G, h, w, 7] by aspect, slope and shade, [G, h, w, 7]; level: see ``Spell.level``."""
     if spell.sunlight is None or rise is None:
         return moisture
     moisture = moisture[:, None, None] if moisture.dim() == 2 else moisture
-    return moisture * spell.sunlight.factors(rise, ground.layer("canopy_cover"))
+    return moisture * spell.sunlight.factors(rise, ground.layer("canopy_cover"), level)
 
 
 def rise_of(landscape: Landscape, window: Window, cell_size: float) -> Tensor:

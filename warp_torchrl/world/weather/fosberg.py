@@ -72,7 +72,8 @@ def reference_moisture(temperature: Tensor, humidity: Tensor) -> Tensor:
         temperature: Of the air [C].
         humidity: Of the air [per cent].
     """
-    row = torch.bucketize(1.8 * temperature + 32.0, torch.tensor(_WARM, device=temperature.device), right=True)
+    fahrenheit = (1.8 * temperature + 32.0).contiguous()
+    row = torch.bucketize(fahrenheit, torch.tensor(_WARM, device=temperature.device), right=True)
     column = (humidity / _HUMIDITY).floor().clamp(0.0, 20.0).long()
     return _REFERENCE.to(temperature.device)[row, column]
 

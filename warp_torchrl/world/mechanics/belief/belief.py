@@ -11,46 +11,35 @@ from typing import ClassVar, Literal
 import torch
 from torch import Tensor
 
-from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.batch import Named
 from warp_torchrl.world.arrays.random import imagined_keys, named_key
-from warp_torchrl.world.backends.backend import forecast
 from warp_torchrl.world.ensemble.filtering import moments, resampled
-from warp_torchrl.world.ensemble.members import (
-    as_known,
-    held,
-    in_parameters,
-    rows_of,
-    ticked,
-    unburned,
-    worlds_of,
-)
+from warp_torchrl.world.ensemble.members import as_known, in_parameters, rows_of, unburned, worlds_of
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.mechanics.belief.beliefs import (
     NAME,
     Beliefs,
     beliefs_of,
     burn_soon,
-    cells_of,
     disagreement,
     hidden_fire,
     hidden_probability,
     known_probability,
-    mean_of,
     most_believed,
 )
 from warp_torchrl.world.mechanics.belief.correcting import corrected, weighed
 from warp_torchrl.world.mechanics.belief.fit import counted, metrics_of
 from warp_torchrl.world.mechanics.belief.hidden import DOUBT, fires_lit, hidden_fires, struck
-from warp_torchrl.world.mechanics.belief.learning import PARAMETERS, Learning, begun, learned, noted, watched
-from warp_torchrl.world.mechanics.belief.sightings import sightings
+from warp_torchrl.world.mechanics.belief.learning import PARAMETERS, Learning, begun, noted
+from warp_torchrl.world.mechanics.belief.sightings import newest, sightings, since_tick
 from warp_torchrl.world.mechanics.belief.soon import foreseen
+from warp_torchrl.world.mechanics.belief.ticking import after_tick
 from warp_torchrl.world.mechanics.mechanic import Mechanic, Metric, Rules
 from warp_torchrl.world.mechanics.table import part
-from warp_torchrl.world.state.cells import is_burning, is_tree
-from warp_torchrl.world.state.records import KNOWLEDGE, freshness, kept, recorded
-from warp_torchrl.world.state.state import EMPTY, FIRST_FIRE, WorldState
+from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.records import KNOWLEDGE, freshness, kept
+from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.team.hearing import HEARING
 from warp_torchrl.world.team.knowledge import Belief
 
@@ -68,12 +57,6 @@ def _believed_map(show: Callable[[Beliefs], Tensor]) -> Callable[[WorldState], T
         return codes[:, 0] if codes.shape[1] == 1 else codes
 
     return shown
-
-
-def _since_tick(state: WorldState, world: Rules) -> Tensor:
-    """Return the least record of what was seen since the last tick of the fire, int32 [B]."""
-    ticked_at = state.step - state.step % world.steps_per_tick
-    return recorded(torch.zeros_like(ticked_at), ticked_at)
 
 
 @part
@@ -205,7 +188,8 @@ class Ensemble(Belief, Mechanic):
     def step(self, before: WorldState, after: WorldState, running: Tensor, world: Rules) -> WorldState:
         """Return worlds whose beliefs have ticked, and were weighed and corrected by what is seen after the step."""
         now = after.tick > before.tick
-        after = self._looked(self._ticked(before, after, world), kept(before), running, world)
+        after = after_tick(before, after, world, self.law(world.fire))
+        after = self._looked(after, kept(before), running, world)
         after = foreseen(after, now, world, self.law(world.fire), self.soon)
         beliefs = beliefs_of(after)
         return after.with_planes(NAME, counted(beliefs, is_burning(after.cells), running, self.threshold))
@@ -223,7 +207,8 @@ class Ensemble(Belief, Mechanic):
         """Return the chance of each cell to burn, known and hidden, where smoke comes from that nobody explains, and a
         little for each that was long not seen.
         """
-        beliefs, records = beliefs_of(state), self._records(state)
+        beliefs = beliefs_of(state)
+        records = newest(kept(state), beliefs.weights.shape[1])
         p = known_probability(beliefs)
         burns = p * (1.0 - p) + beliefs.unseen
         signs = world.sensing.signs(state, world.team, p)
@@ -235,8 +220,9 @@ class Ensemble(Belief, Mechanic):
 
         It is 0 of cells that cannot burn, or were seen since the last tick.
         """
-        may = (state.alpha > 0.0)[:, None] & (self._records(state) < _since_tick(state, world)[:, None, None, None])
-        return hidden_probability(beliefs_of(state), fires_lit(world.lighting)) * may
+        beliefs, since = beliefs_of(state), since_tick(state, world)[:, None, None, None]
+        may = (state.alpha > 0.0)[:, None] & (newest(kept(state), beliefs.weights.shape[1]) < since)
+        return hidden_probability(beliefs, fires_lit(world.lighting)) * may
 
     def believed_fire(self, state: WorldState, world: Rules) -> tuple[Tensor, Tensor]:
         """Return the members' share that burns, and the chance of a hidden fire, float32 [B, G, H, W] each."""
@@ -287,75 +273,6 @@ class Ensemble(Belief, Mechanic):
         deviations = self.rate_deviation, self.wind_speed_deviation, self.bearing_deviation
         return begun(state, key, deviations, (groups, self.members, self.hidden, self.particles))
 
-    def _ticked(self, before: WorldState, after: WorldState, world: Rules) -> WorldState:
-        """Return worlds whose members and hidden fires have ticked where the fire has; on a CPU those alone."""
-        now = after.tick > before.tick
-        if not needs_no_sync(now.device):
-            return after.with_planes(NAME, self._after_tick(before, after, now, world))
-        index = now.nonzero()[:, 0]
-        if not len(index):
-            return after
-        if len(index) == len(now):
-            return after.with_planes(NAME, self._after_tick(before, after, now, world))
-        beliefs = beliefs_of(after).clone()
-        beliefs[index] = self._after_tick(before[index], after[index], now[index], world)
-        return after.with_planes(NAME, beliefs)
-
-    def _after_tick(self, before: WorldState, after: WorldState, now: Tensor, world: Rules) -> Beliefs:
-        beliefs = self._acted(before, after)
-        beliefs = self._learned(before, beliefs, now, world)
-        fire, members = self.law(world.fire), worlds_of(before, beliefs.members, world.fire)
-        known = beliefs.learning
-        values = as_known(members, world.fire, fire) if known is None else known.members.flatten(0, 2)
-        members = in_parameters(members, fire, values)
-        count, chances = beliefs.members.held["key"].shape[1], beliefs.chances
-        rows = rows_of(before, count)
-        if self.trusts(world):
-            ignites = forecast(fire, members).ignition_probability * now[rows][:, None, None]
-            chances = chances.replace(values=ignites.unflatten(0, (-1, count)))
-
-        def grown(own: Named, worlds: WorldState, count: int, parameters: Tensor | None) -> Named:
-            rows = rows_of(before, count)
-            air = after.air[rows] if world.air.changes else after.air
-            new = held(ticked(worlds, fire, world.air, now[rows], air, parameters), count, fire)
-            drawn = (name for name in world.fire.draws if name in own.held)
-            return new.replace(**{name: own.held[name] for name in drawn})  # without the factor on their rate
-
-        hidden = beliefs.hidden
-        if self.hidden:
-            worlds = worlds_of(before, hidden, fire)
-            lit = as_known(worlds, world.fire, fire) if known is None else known.hidden.flatten(0, 1)
-            worlds = in_parameters(worlds, fire, lit)
-            hidden = grown(hidden, worlds, self.hidden, lit)
-        return beliefs.replace(members=grown(beliefs.members, members, count, values), chances=chances, hidden=hidden)
-
-    def _acted(self, before: WorldState, after: WorldState) -> Beliefs:
-        """Return beliefs without the fire and trees that agents have just put out and cleared, and see so now."""
-        beliefs, now = beliefs_of(after), recorded(torch.zeros_like(after.step), after.step)
-        put_out, cleared = is_burning(before.cells) & is_tree(after.cells), after.firebreak & ~before.firebreak
-        acted = (put_out | cleared)[:, None] & (self._records(after) >= now[:, None, None, None])
-        cells = cells_of(beliefs)
-        cells = torch.where(acted[:, :, None], EMPTY, cells).to(torch.uint8).flatten(1, 2)
-        return beliefs.replace(members=beliefs.members.replace(cells=cells))
-
-    def _learned(self, before: WorldState, beliefs: Beliefs, now: Tensor, world: Rules) -> Beliefs:
-        """Return beliefs that have learned of the last tick, and keep what they know of the fire's edge before this."""
-        known = beliefs.learning
-        if known is None:
-            return beliefs
-        known = learned(before, known, self.law(world.fire), world.sensing.errors, now)
-        cells, wet = (beliefs.members.held[name].unflatten(1, beliefs.weights.shape[1:]) for name in ("cells", "wet"))
-        spreads = (cells >= FIRST_FIRE) & (cells <= world.fire.last_spreading)
-        fuel = (is_tree(cells) & (cells >= world.fire.youngest_fuel) & (wet == 0)).any(dim=2)
-        planes = mean_of(beliefs, spreads), mean_of(beliefs, is_burning(cells)), fuel & (before.alpha > 0.0)[:, None]
-        since = _since_tick(before, world)
-        return beliefs.replace(learning=watched(before, known, planes, self._records(before), since))
-
-    def _records(self, state: WorldState) -> Tensor:
-        """Return the newest records of each belief, int32 [B, G, H, W]."""
-        records = kept(state)
-        return records.amax(dim=1, keepdim=True) if self.of == "team" else records
-
     def _no_chances(self, state: WorldState, groups: int, world: Rules) -> Named:
         if not self.trusts(world):
             return Named()
@@ -363,12 +280,10 @@ class Ensemble(Belief, Mechanic):
 
     def _looked(self, state: WorldState, before: Tensor, running: Tensor, world: Rules) -> WorldState:
         """Return worlds whose beliefs were weighed and corrected by the records that are newer than before."""
-        records = self._records(state)
-        if self.of == "team":
-            before = before.amax(dim=1, keepdim=True)
-        since = _since_tick(state, world)
-        seen = sightings(before, records, running, since)
         beliefs, (miss, false_alarm) = beliefs_of(state), world.sensing.errors
+        before, records = (newest(each, beliefs.weights.shape[1]) for each in (before, kept(state)))
+        since = since_tick(state, world)
+        seen = sightings(before, records, running, since)
         if self.trusts(world):
             beliefs = weighed(state, beliefs, seen, self.trusts(world), self.error, (miss, false_alarm))
         if beliefs.learning is not None:

@@ -6,8 +6,9 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.arrays.listing import list_cells
-from warp_torchrl.world.state.records import read
-from warp_torchrl.world.state.state import FIRST_FIRE
+from warp_torchrl.world.mechanics.mechanic import Rules
+from warp_torchrl.world.state.records import read, recorded
+from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
 
 
 class Sightings(NamedTuple):
@@ -44,6 +45,22 @@ class Sightings(NamedTuple):
         """Return planes [B, G, K, H, W] with values [B, G, K, n] there; what is not there must have its old value."""
         index = self.cell[:, :, None].expand(-1, -1, planes.shape[2], -1)
         return planes.flatten(3).scatter(3, index, values.to(planes.dtype)).view_as(planes)
+
+
+def since_tick(state: WorldState, world: Rules) -> Tensor:
+    """Return the least record of what was seen since the last tick of the fire, int32 [B]."""
+    ticked_at = state.step - state.step % world.steps_per_tick
+    return recorded(torch.zeros_like(ticked_at), ticked_at)
+
+
+def newest(records: Tensor, groups: int) -> Tensor:
+    """Return the newest records of each of G beliefs, int32 [B, G, H, W]: the team's, or those of each agent.
+
+    Args:
+        records: Of the agents, int32 [B, A, H, W].
+        groups: G, 1 or A.
+    """
+    return records.amax(dim=1, keepdim=True) if groups == 1 else records
 
 
 def sightings(before: Tensor, records: Tensor, running: Tensor, since_tick: Tensor) -> Sightings:
