@@ -89,12 +89,17 @@ def board_table(board: Board, rows: Sequence[Row]) -> str:
     ]
     for row in [*whole, *others]:
         value, error = points(board, row) if row in whole else (float("nan"), float("nan"))
-        shown = [f"{value:.1f}", f"{value - error:.1f} .. {value + error:.1f}"] if row in whole else ["-", "-"]
+        ends = " .. ".join(_short(each) for each in (value - error, value + error))
+        shown = [_short(value), ends] if row in whole else ["-", "-"]
         steps = "-" if row.steps is None else f"{row.steps:,}"
         known = " ".join(dict.fromkeys(played.knowledge for played in row.tasks.values()))
         cells = [_mean(row, task) for task in board.tasks.values()]
         lines.append("| " + " | ".join([row.name.replace("|", "\\|"), known, steps, *shown, *cells]) + " |")
     return "\n".join([*lines, "", WORDS, *_leaders(board, whole)])
+
+
+def _short(value: float) -> str:
+    return f"{round(value, 1) + 0.0:.1f}"  # no -0.0
 
 
 def _unit(task: Task, rows: Sequence[Row]) -> str:
