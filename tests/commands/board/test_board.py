@@ -126,7 +126,8 @@ def test_a_trained_policy_is_known_by_its_weights_and_its_trainings(small, tmp_p
         (["local", "wind.speed=0"], "wind.speed: the rules of a board's tasks are frozen"),
         (["local", "tasks=[three]"], "tasks of small are one, two, got three"),
         (["local", "fires=0"], "fires must be in"),
-        (["no_such"], "no_such is not a run folder"),
+        (["dispach"], "dispach is no baseline, shipped policy or folder: did you mean dispatch?"),
+        (["runs/no_such"], "no_such"),
         (["local", "check=no.json"], "no.json: No such file"),
     ],
 )

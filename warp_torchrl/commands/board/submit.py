@@ -25,6 +25,7 @@ from warp_torchrl.runs.config.construction import ConfigError, construct
 from warp_torchrl.runs.config.grammar import own_values
 from warp_torchrl.runs.history import history_line, trained_steps
 from warp_torchrl.runs.policies.find import find_policy
+from warp_torchrl.system.shipped import policy_names
 from warp_torchrl.training.run import newest
 from warp_torchrl.validation import check_fields, did_you_mean
 
@@ -70,6 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(arguments: Sequence[str]) -> int:
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     policy, options, chosen = read_options(arguments)
+    _check_name(policy)
     board = read_board(options.board)
     tasks = board.chosen(options.tasks)
     against = None if options.check is None else read_row(Path(options.check))
@@ -105,6 +107,17 @@ def read_options(arguments: Sequence[str]) -> tuple[str, SubmitOptions, tuple[st
             raise ConfigError(f"{key}: the rules of a board's tasks are frozen; a team chooses belief alone{hint}")
     options: SubmitOptions = construct(SubmitOptions, values, "")
     return policies[0], options, chosen
+
+
+def _check_name(policy: str) -> None:
+    """Check that a single word names a baseline, a shipped policy or a folder.
+
+    Raises:
+        ConfigError: If it names none.
+    """
+    known = [*HEURISTICS, *policy_names()]
+    if policy not in known and len(Path(policy).parts) == 1 and not Path(policy).exists():
+        raise ConfigError(f"{policy} is no baseline, shipped policy or folder{did_you_mean(policy, known)}")
 
 
 def play_board(
