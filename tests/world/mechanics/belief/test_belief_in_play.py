@@ -140,3 +140,17 @@ def test_a_team_that_is_wrong_of_the_law_imagines_other_fires_in_the_same_world(
 def test_a_law_without_a_kernel_is_refused():
     with pytest.raises(ValueError, match=r"belief\.kernel must be null under a law without one, got fbp"):
         rules("rate", belief=Ensemble(kernel="fbp"))
+
+
+def test_where_fire_was_seen_does_not_depend_on_how_much_other_worlds_see():
+    # Lists of sightings are as long as the longest; what fills up the others must not unsay their first cell.
+    world = rules(radius=2, belief=Ensemble(members=2, hidden=4))
+
+    def seen(*places):
+        state = alight(world, reset(world, len(places)), (0, 0))
+        position = torch.tensor(places, dtype=state.vehicles.position.dtype)
+        return beliefs_of(begun(world, state.replace(vehicles=state.vehicles.replace(position=position)))).lit
+
+    few, many = ((0, 0), (0, 1)), ((5, 3), (9, 9))
+    assert seen(few)[0, 0, 0, 0]
+    assert torch.equal(seen(few, many)[0], seen(few)[0])

@@ -79,7 +79,7 @@ def struck(state: WorldState, beliefs: Beliefs, seen: Sightings, doubt: float, r
         taken = {name: old[name].index_copy(0, rows, planes) for name, planes in taken.items()}
         beliefs = beliefs.replace(members=beliefs.members.replace(**taken))
     before = beliefs.lit[:, :, None]
-    lit = seen.put(before, seen.of(before) | (seen.burns & seen.there)[:, :, None])[:, :, 0]
+    lit = seen.put(before, seen.of(before) | (seen.burns & seen.is_new)[:, :, None])[:, :, 0]
     return beliefs.replace(possible=possible * ~inside, found=beliefs.found + possible * inside, lit=lit)
 
 
