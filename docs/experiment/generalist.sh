@@ -1,7 +1,8 @@
 #!/bin/bash
 # The seven trainings of the shipped generalist, one after the other; two of them were stopped by hand (Ctrl-C) where it says so.
 set -e
-python train.py experiment=generalist hydra.run.dir=runs/1                              # 3 400 000 steps
+python train.py --config-dir docs experiment=generalist mixture=spread scenario=spread_default \
+    hydra.run.dir=runs/1                                                                # 3 400 000 steps
 docs="python train.py --config-dir docs"
 $docs experiment=generalist_finetune start_from=runs/1 hydra.run.dir=runs/2             # 1 300 000
 most="mixture.kinds.large.share=6 mixture.kinds.hilly.share=2 mixture.kinds.small.share=1 mixture.kinds.single.share=0.5

@@ -10,7 +10,7 @@ from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.runs.config.compose import conf_folder
 
-OF_A_MAP = ("attack_landfire", "landfire", "wildland")
+OF_A_MAP = ("attack_landfire", "landfire", "spread_landfire", "wildland")
 """Scenarios whose ground is a folder of the user's."""
 SMALL = ("landscape.size=16", "horizon=5")
 SCENARIOS = tuple(sorted(path.stem for path in (conf_folder() / "scenario").glob("*.yaml")))

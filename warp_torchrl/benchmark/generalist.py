@@ -32,6 +32,7 @@ class ScenarioVariant(NamedTuple):
 
 
 OURS = tuple(ScenarioVariant(name, name) for name in SCENARIOS if not name.startswith("paper"))
+SPREAD = tuple(ScenarioVariant(f"spread_{each.name}", f"spread_{each.name}") for each in OURS if each.name != "hazard")
 TEAMS = tuple(
     ScenarioVariant(f"default, {n} vehicles", "default", (f"team.n_agents={n}",)) for n in (1, 2, 3, 6, 12, 16)
 )
@@ -41,16 +42,26 @@ MAPS = tuple(
 )
 WINDS = tuple(ScenarioVariant(f"default, {speed} m/s", "default", (f"wind.speed={speed}",)) for speed in (0, 2, 8, 12))
 GIANT = (ScenarioVariant("giant", "giant"),)
-SPECIALISTS = tuple(ScenarioVariant(name, name, rival=name) for name in ("skirmish", "single", "default"))
+SPECIALISTS = tuple(
+    ScenarioVariant(f"spread_{name}", f"spread_{name}", rival=name) for name in ("skirmish", "single", "default")
+)
 
 
 def on_ground(folder: str) -> tuple[ScenarioVariant, ...]:
-    """Return the places on the real ground of a folder: under law ``paper``, and in metres and minutes."""
+    """Return the places on the real ground of a folder: of cells and steps, and in metres and minutes."""
     path = f"landscape.path='{folder}'"
     return (ScenarioVariant("landfire", "landfire", (path,)), ScenarioVariant("wildland", "wildland", (path,)))
 
 
-PLACES = {"scenarios": OURS, "teams": TEAMS, "maps": MAPS, "winds": WINDS, "giant": GIANT, "specialists": SPECIALISTS}
+PLACES = {
+    "scenarios": OURS,
+    "spread": SPREAD,
+    "teams": TEAMS,
+    "maps": MAPS,
+    "winds": WINDS,
+    "giant": GIANT,
+    "specialists": SPECIALISTS,
+}
 """Groups of places; those on real ground need a folder."""
 RIVALS = ("local", "greedy", "coordinated", "dispatch", "ring", "mixed")
 """The baselines for teams that see the fire; the others search for it, watch it, or share a land."""

@@ -24,12 +24,13 @@ from warp_torchrl.world.air.gridded import Gridded
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.ignition.file import IgnitionFile
 from warp_torchrl.world.law.fire import Slopes
+from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.raster import Raster
 from warp_torchrl.world.world import World
 
-NEED_A_FOLDER = ("attack_landfire", "landfire", "wildland")
+NEED_A_FOLDER = ("attack_landfire", "landfire", "spread_landfire", "wildland")
 SCENARIOS = sorted(path.stem for path in (conf_folder() / "scenario").glob("*.yaml") if path.stem not in NEED_A_FOLDER)
 EXPERIMENTS = sorted(path.stem for folder in (conf_folder() / "experiment", OF_DOCS) for path in folder.glob("*.yaml"))
 OPTIONS = [(path.parent.name, path.stem) for path in sorted(conf_folder().glob("*/*.yaml"))]
@@ -82,10 +83,17 @@ def test_a_class_without_arguments_is_its_option(option):
     assert component(node["_target_"])() == build(node, group)
 
 
-def test_a_world_without_arguments_is_the_scenario_default():
-    world = run_config(plain(compose_config("train", ["scenario=default"]))).world
+def test_a_world_without_arguments_is_default_under_the_law_of_the_report():
+    world = run_config(plain(compose_config("train", ["scenario=spread_default"]))).world
     assert replace(world, mechanics=()) == World(), "a radio without limits, which carries what networks say, is all"
-    assert make_env().world == world
+    assert make_env().world == run_config(plain(compose_config("train", ["scenario=default"]))).world
+
+
+@pytest.mark.parametrize("name", [each for each in SCENARIOS if not each.startswith(("spread_", "paper_", "haksar"))])
+def test_in_every_scenario_but_those_of_printed_laws_more_wind_burns_more(name):
+    # The laws of which tests/world/test_laws.py and tests/world/law/test_rate.py show it.
+    fire = build(compose_config("train", [f"scenario={name}"]).fire, "fire")
+    assert isinstance(fire, RateFire) or (fire.kernel == "fbp" and fire.refinement >= 8)
 
 
 def test_no_scenario_repeats_a_default_but_its_size_which_each_landscape_has_another_of():
@@ -432,7 +440,7 @@ def test_a_yaml_file_that_was_edited_is_read_anew(tmp_path, monkeypatch):
             ([], []),
             (["scenario=large", "reward=time", "n_worlds=3"], []),
             (["team.n_agents=4", "wind.speed=10"], ["wind.speed=10", "team.n_agents=4"]),
-            (["team.roles=[uav,ugv]", "fire=hazard"], ["fire=hazard", "team.roles=['uav','ugv']"]),
+            (["team.roles=[uav,ugv]", "fire=hazard"], ["fire.refinement=24", "team.roles=['uav','ugv']"]),
             (["landscape=raster", "landscape.path=/tmp/land", "horizon=9"], ["landscape=raster", "horizon=9"]),
             (
                 ["landscape=raster", "landscape.table={11:3,98:0}"],
@@ -444,7 +452,9 @@ def test_a_yaml_file_that_was_edited_is_read_anew(tmp_path, monkeypatch):
                 ["scenario=search", "model.messages=both", "mechanics.radio.loss=0.0"],
                 ["mechanics.radio.carries=map", "mechanics.radio.loss=0.0"],
             ),
-            (["wind=calm", "fire=paper"], ["wind=calm", "fire.growth=True", "fire.beta=0.65", "fire.p_regrow=0.01"]),
+            (["wind=calm", "fire=paper"], ["wind=calm", "fire=paper"]),
+            (["fire=paper", "fire.beta=0.5"], ["fire=paper", "fire.beta=0.5"]),
+            (["fire=spread", "steps_per_tick=4"], ["fire=spread", "steps_per_tick=4"]),
         ]
         if can_play(each[0])
     ],

@@ -166,11 +166,10 @@ def world_overrides(values: Mapping[str, Any]) -> list[str]:
     usual = _composed_worlds(choices)
     for group, parts in values.items():
         if group in usual and isinstance(parts, Mapping) and parts.get("_target_") != usual[group].get("_target_"):
-            options = (f"{group}={option}" for option in option_names(group))
-            of_its_class = (
-                each for each in options if _composed_worlds([*choices, each])[group]["_target_"] == parts["_target_"]
-            )
-            choices.append(next(of_its_class))
+            options = {each: _composed_worlds([*choices, f"{group}={each}"])[group] for each in option_names(group)}
+            of_its_class = [each for each, other in options.items() if other["_target_"] == parts["_target_"]]
+            nearest = min(of_its_class, key=lambda each: sum(options[each].get(key) != parts[key] for key in parts))
+            choices.append(f"{group}={nearest}")
             usual = _composed_worlds(choices)
     plain_ones = [name for name, own in values.get("mechanics", {}).items() if not own]  # with their defaults
     added = [f"mechanics.{name}={{}}" for name in plain_ones if name not in usual["mechanics"]]
