@@ -1,6 +1,7 @@
 """A policy's history: every training behind it counts once, whoever saved, resumed, averaged or exported it."""
 
 import json
+from dataclasses import asdict, replace
 
 import pytest
 
@@ -22,6 +23,7 @@ from warp_torchrl.runs.history import (
     mean_of,
     stage_of,
     teacher_names,
+    trained_minutes,
     trained_steps,
 )
 
@@ -36,6 +38,21 @@ def test_a_mean_counts_what_its_policies_share_once():
     assert [each.steps for each in mean] == [100, 30, 5, 0] and trained_steps(mean) == 135
     assert mean[-1].algorithm == MEAN and mean[-1].parents == ("c", "b")
     assert history_line(mean) == "135 world steps in 3 trainings"
+
+
+def test_minutes_are_summed_where_each_training_took_them():
+    first, second = replace(stage("a", 100), minutes=1.5), replace(stage("b", 30, "a"), minutes=2.0)
+    assert trained_minutes((first, second)) == 3.5 == trained_minutes(mean_of([(first, second)]))
+    assert trained_minutes((first, stage("b", 30, "a"))) is None
+    kept = json.loads(json.dumps(history_to_plain((first, second))))
+    assert history_from_plain(kept) == (first, second)
+
+
+@pytest.mark.parametrize("minutes", ["1", True, -1.0, float("nan"), float("inf"), 7])
+def test_minutes_that_are_no_number_are_refused(minutes):
+    content = [asdict(stage("a", 1)) | {"teachers": [], "parents": [], "minutes": minutes}]
+    with pytest.raises(ValueError, match="minutes must be a number"):
+        history_from_plain(content)
 
 
 def test_two_checkpoints_of_one_training_are_one_training():
@@ -106,7 +123,8 @@ def test_a_checkpoint_without_a_history_tells_what_its_configuration_says(tmp_pa
     found = newest(tmp_path)[0]
     content = json.loads((found.path / "manifest.json").read_text())
     forge(found.path, history=[])
-    assert newest(tmp_path)[0].history == found.history and content["history"]
+    own = tuple(replace(stage, minutes=None) for stage in found.history)
+    assert newest(tmp_path)[0].history == own and content["history"]
     forge(found.path, history=[{"key": "a"}])
     with pytest.raises(CheckpointError, match=r"manifest.json is not a manifest of format 2"):
         newest(tmp_path)

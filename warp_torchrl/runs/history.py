@@ -43,6 +43,7 @@ class Stage:
         teachers: Teachers beside the rewards.
         adviser: Heuristic whose advice the agents observe; None without one.
         parents: Keys of the stages whose networks it began with, or whose mean it is.
+        minutes: Of this training by the wall clock; None of a mean, and where no one took them.
     """
 
     key: str
@@ -52,6 +53,7 @@ class Stage:
     teachers: tuple[Teacher, ...] = ()
     adviser: str | None = None
     parents: tuple[str, ...] = ()
+    minutes: float | None = None
 
 
 History = tuple[Stage, ...]
@@ -61,6 +63,12 @@ History = tuple[Stage, ...]
 def trained_steps(history: History) -> int:
     """Return the world steps of all trainings of a history, each counted once."""
     return sum(stage.steps for stage in history)
+
+
+def trained_minutes(history: History) -> float | None:
+    """Return the minutes of all trainings of a history; None where those of one are not known."""
+    minutes = [stage.minutes for stage in history if stage.algorithm != MEAN]
+    return None if None in minutes else sum(each for each in minutes if each is not None)
 
 
 def taught_by(history: History) -> tuple[Teacher, ...]:
@@ -124,9 +132,9 @@ def stage_of(
     )
 
 
-def with_steps(stage: Stage, steps: int) -> Stage:
-    """Return the stage of a training after some world steps."""
-    return replace(stage, steps=steps)
+def with_steps(stage: Stage, steps: int, minutes: float | None = None) -> Stage:
+    """Return the stage of a training after some world steps, and minutes where they are known."""
+    return replace(stage, steps=steps, minutes=minutes)
 
 
 def teacher_names(values: Mapping[str, Any]) -> list[str]:
@@ -168,6 +176,7 @@ def _stage(node: dict[str, Any]) -> Stage:
     adviser = None if node["adviser"] is None else _text(node["adviser"])
     fields = {**node, "teachers": teachers, "adviser": adviser, "steps": _whole(node["steps"])}
     fields |= {name: _text(node[name]) for name in ("key", "worlds", "algorithm")}
+    fields["minutes"] = None if node.get("minutes") is None else _minutes(node["minutes"])
     return Stage(**{**fields, "parents": tuple(_text(each) for each in _listed(node["parents"]))})
 
 
@@ -186,6 +195,12 @@ def _text(value: object) -> str:
 def _whole(value: object) -> int:
     if type(value) is not int or not 0 <= value < 2**62:
         raise ValueError(f"steps must be a whole number, got {value!r:.40}")
+    return value
+
+
+def _minutes(value: object) -> float:
+    if type(value) is not float or not 0.0 <= value < 1e9:
+        raise ValueError(f"minutes must be a number, got {value!r:.40}")
     return value
 
 

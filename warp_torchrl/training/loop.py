@@ -227,7 +227,7 @@ class Training(Learning):
     @property
     def history(self) -> History:
         """Return the trainings behind the policy as it is now, this one last."""
-        return (*self.before, with_steps(self._stage, self.frames))
+        return (*self.before, with_steps(self._stage, self.frames, round(self.seconds / 60.0, 2)))
 
     @cached_property
     def _stage(self) -> Stage:

@@ -8,7 +8,7 @@ import pytest
 from warp_torchrl.commands.board import submit, table, tasks
 from warp_torchrl.commands.board.rows import Played, Row, read_row, write_row
 from warp_torchrl.commands.board.table import board_table, is_whole, points
-from warp_torchrl.commands.board.tasks import Board, Task
+from warp_torchrl.commands.board.tasks import Board, Budget, Task
 from warp_torchrl.runs.config.construction import ConfigError
 
 
@@ -19,7 +19,9 @@ def a_task(name: str, **changes: object) -> Task:
     return Task(**{**given, "name": name, "overrides": overrides, "rules": tasks.rules_of(world), **changes})
 
 
-SMALL = Board(name="small", tasks={name: a_task(name) for name in ("one", "two")})
+SMALL = Board(
+    name="small", budget=Budget(steps=1000, minutes=60.0), tasks={name: a_task(name) for name in ("one", "two")}
+)
 
 
 def a_row(name: str = "r", values: tuple[float, ...] = (0.2, 0.4), steps: int | None = None, **changes: object) -> Row:
@@ -43,6 +45,7 @@ def test_a_row_is_read_as_it_was_written(tmp_path) -> None:
         (lambda row: row.update(name="better"), "was changed after it was written"),
         (lambda row: row.update(name="a\nb"), "is no row of a board: names must be lines"),
         (lambda row: row.update(steps=-1), "is no row of a board: steps must be a whole number"),
+        (lambda row: row.update(minutes="soon"), "is no row of a board: minutes must be a number"),
         (lambda row: row.pop("seal"), "is no row of a board: 'seal'"),
         (lambda row: row["tasks"]["one"].update(values=[]), "is no row of a board: values must be 1 to"),
         (lambda row: row["tasks"]["one"].update(knowledge="god"), "is no row of a board: better, unit and knowledge"),
@@ -76,7 +79,7 @@ def test_a_row_of_some_tasks_or_fires_or_other_rules_is_not_whole() -> None:
     other = replace(whole, tasks={**whole.tasks, "two": replace(whole.tasks["two"], rules="other")})
     assert not any(is_whole(SMALL, row) for row in (fewer, shorter, other))
     told = board_table(SMALL, [fewer, other, whole])
-    assert told.splitlines()[4].startswith("| r | all | - | 60.0 |"), "the whole row is first"
+    assert told.splitlines()[4].startswith("| r | all | - | - | 60.0 |"), "the whole row is first"
     assert "30.0 (other rules)" in told
 
 
@@ -86,6 +89,14 @@ def test_the_best_team_stands_beside_the_best_baseline_that_knows_the_same() -> 
     assert "| `one` | all | team | dispatch | +15.0 | +10.0 .. +20.0 |" in told
     order = [line.split(" | ")[0] for line in told.splitlines()[4:7]]
     assert order == ["| team", "| dispatch", "| worse"]
+
+
+def test_a_row_over_the_budget_stands_below_those_within_it() -> None:
+    best = a_row("long", (0.9, 0.9), steps=1001)
+    slow = a_row("slow", (0.8, 0.8), steps=9, minutes=60.1)
+    rows = [best, slow, a_row("within", (0.1, 0.2), steps=1000, minutes=60.0), a_row("dispatch", (0.4, 0.5))]
+    order = [line.split(" | ")[0] for line in board_table(SMALL, rows).splitlines()[4:8]]
+    assert order == ["| dispatch", "| within", "| long (over the budget)", "| slow (over the budget)"]
 
 
 @pytest.fixture
@@ -143,7 +154,7 @@ def test_a_belief_is_chosen_where_sight_is_limited(tmp_path) -> None:
     overrides = ("horizon=12", "landscape.size=12")
     search = a_task("two", scenario="search", overrides=overrides, rules="")
     search = replace(search, rules=search.found_rules)
-    board = Board(name="small", tasks={"one": SMALL.tasks["one"], "two": search})
+    board = Board(name="small", budget=SMALL.budget, tasks={"one": SMALL.tasks["one"], "two": search})
     chosen = ("belief=ensemble", "belief.members=2", "belief.hidden=4")
     rows = [submit.play_board(board, [*board.tasks.values()], "oldest", "o", each, 1) for each in ((), chosen)]
     known = [[played.knowledge for played in row.tasks.values()] for row in rows]

@@ -72,6 +72,7 @@ class Row:
         policy: Hash of the policy: of its weights and configuration, or a baseline's name.
         trained: Its trainings in a line; empty for what was not trained.
         steps: World steps of all its trainings; None for what was not trained.
+        minutes: Of all its trainings by the wall clock; None where they are not known.
         code: Hash of the sources that played it.
         made: Day, version of the package and of torch.
         options: Overrides beside the tasks' own: what the team believes.
@@ -83,6 +84,7 @@ class Row:
     policy: str
     trained: str = ""
     steps: int | None = None
+    minutes: float | None = None
     code: str
     made: Mapping[str, str]
     options: tuple[str, ...] = ()
@@ -133,5 +135,8 @@ def _row(content: Any) -> Row:
             raise ValueError(f"names must be lines of at most {_LONGEST} characters")
     if not (given["steps"] is None or (type(given["steps"]) is int and given["steps"] >= 0)):
         raise ValueError("steps must be a whole number")
+    minutes = given.get("minutes")
+    if not (minutes is None or (type(minutes) is float and 0.0 <= minutes < 1e9)):
+        raise ValueError("minutes must be a number")
     tasks = {name: Played(**{**each, "values": tuple(each["values"])}) for name, each in given["tasks"].items()}
     return Row(**{**given, "options": tuple(given["options"]), "tasks": tasks})

@@ -23,7 +23,7 @@ from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import plain
 from warp_torchrl.runs.config.construction import ConfigError, construct
 from warp_torchrl.runs.config.grammar import own_values
-from warp_torchrl.runs.history import history_line, trained_steps
+from warp_torchrl.runs.history import history_line, trained_minutes, trained_steps
 from warp_torchrl.runs.policies.find import find_policy
 from warp_torchrl.system.shipped import policy_names
 from warp_torchrl.training.run import newest
@@ -148,6 +148,7 @@ def play_board(
         policy=f"baseline {policy}" if found is None else _hash_of(found),
         trained="" if found is None else history_line(found.history),
         steps=None if found is None else trained_steps(found.history),
+        minutes=None if found is None else trained_minutes(found.history),
         code=code_digest()[:_DIGITS],
         made={"day": f"{datetime.now(UTC):%Y-%m-%d}", "warp_torchrl": __version__, "torch": torch.__version__},
         options=tuple(chosen),

@@ -50,7 +50,12 @@ def _files(arguments: Sequence[str]) -> list[Path]:
 
 def board_lines(board: Board) -> str:
     """Return the tasks of a board as a Markdown table."""
-    lines = [f"**{board.name}**", "", "| task | asks | scenario | fires | rules |", "|---|---|---|---|---|"]
+    lines = [
+        f"**{board.name}**: {_told(board)}",
+        "",
+        "| task | asks | scenario | fires | rules |",
+        "|---|---|---|---|---|",
+    ]
     lines += [
         f"| `{task.name}` | {task.about} | `{task.scenario}` | {task.fires} | `{task.rules}` |"
         for task in board.tasks.values()
@@ -72,30 +77,34 @@ def task_lines(board: Board, row: Row) -> list[str]:
 def board_table(board: Board, rows: Sequence[Row]) -> str:
     """Return the rows of a board, best first, and by task the best team beside the best baseline that knows the same.
 
-    Rows that lack a task or fires, or that played other rules, stand below the others, without points.
+    Rows whose trainings took more than the budget stand below the others; last, without points, those that lack a task
+    or fires, or that played other rules.
 
     Args:
         board: The board.
         rows: Its rows.
     """
-    whole = sorted((row for row in rows if is_whole(board, row)), key=lambda row: -points(board, row)[0])
+    whole = [row for row in rows if is_whole(board, row)]
+    whole.sort(key=lambda row: (not within(board, row), -points(board, row)[0]))
     others = [row for row in rows if row not in whole]
     heads = [f"`{name}`" for name in board.tasks]
     lines = [
         f"**{board.name}**: {', '.join(f'{task.name} in {_unit(task, rows)}' for task in board.tasks.values())}",
         "",
-        "| row | knows | steps | points | 95 % | " + " | ".join(heads) + " |",
-        "|---" * (5 + len(heads)) + "|",
+        "| row | knows | steps | minutes | points | 95 % | " + " | ".join(heads) + " |",
+        "|---" * (6 + len(heads)) + "|",
     ]
     for row in [*whole, *others]:
         value, error = points(board, row) if row in whole else (float("nan"), float("nan"))
         ends = " .. ".join(_short(each) for each in (value - error, value + error))
         shown = [_short(value), ends] if row in whole else ["-", "-"]
         steps = "-" if row.steps is None else f"{row.steps:,}"
+        minutes = "-" if row.minutes is None else f"{row.minutes:,.0f}"
+        name = row.name.replace("|", "\\|") + ("" if within(board, row) else " (over the budget)")
         known = " ".join(dict.fromkeys(played.knowledge for played in row.tasks.values()))
         cells = [_mean(row, task) for task in board.tasks.values()]
-        lines.append("| " + " | ".join([row.name.replace("|", "\\|"), known, steps, *shown, *cells]) + " |")
-    return "\n".join([*lines, "", WORDS, *_leaders(board, whole)])
+        lines.append("| " + " | ".join([name, known, steps, minutes, *shown, *cells]) + " |")
+    return "\n".join([*lines, "", f"Budget: {_told(board)}; {WORDS}", *_leaders(board, whole)])
 
 
 def _short(value: float) -> str:
@@ -121,6 +130,15 @@ def is_whole(board: Board, row: Row) -> bool:
         (played.rules, played.first_seed, len(played.values)) == (task.rules, task.first_seed, task.fires)
         for task, played in ((board.tasks[name], played) for name, played in row.tasks.items())
     )
+
+
+def within(board: Board, row: Row) -> bool:
+    """Return whether the trainings of a row took no more than the budget of its board."""
+    return board.budget.allows(row.steps, row.minutes)
+
+
+def _told(board: Board) -> str:
+    return f"a team has {board.budget.steps:,} world steps and {board.budget.minutes:,.0f} minutes to train"
 
 
 def points(board: Board, row: Row) -> tuple[float, float]:

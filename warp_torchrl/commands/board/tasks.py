@@ -74,15 +74,37 @@ class Task:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Budget:
+    """What all trainings of a team together may take, that its row has a place among the others.
+
+    Attributes:
+        steps: World steps.
+        minutes: By the wall clock, on whatever machine; of policies that did not take them steps alone count.
+    """
+
+    steps: int
+    minutes: float
+
+    def __post_init__(self) -> None:
+        check_fields(self, steps=(1, 10**15), minutes=(0.1, 1e9))
+
+    def allows(self, steps: int | None, minutes: float | None) -> bool:
+        """Return whether trainings that took so much are within it; those of baselines took nothing."""
+        return (steps or 0) <= self.steps and (minutes or 0.0) <= self.minutes
+
+
+@dataclass(frozen=True, kw_only=True)
 class Board:
     """A frozen list of tasks.
 
     Attributes:
         name: Its name and version.
+        budget: Of a team's trainings.
         tasks: The tasks by name.
     """
 
     name: str
+    budget: Budget
     tasks: dict[str, Task]
 
     def chosen(self, names: Sequence[str] | None) -> list[Task]:
@@ -113,7 +135,10 @@ def read_board(name: str = NEWEST) -> Board:
         raise ConfigError(f"board must be one of {', '.join(boards())}, got {name}{did_you_mean(name, boards())}")
     content = read_yaml(conf_folder() / "board" / f"{name}.yaml")
     common = {"board": name, "fires": content["fires"]}
-    return Board(name=name, tasks={key: Task(name=key, **common | task) for key, task in content["tasks"].items()})
+    budget = Budget(**content["budget"])
+    return Board(
+        name=name, budget=budget, tasks={key: Task(name=key, **common | task) for key, task in content["tasks"].items()}
+    )
 
 
 def world_of(scenario: str, overrides: Sequence[str]) -> World:
