@@ -111,12 +111,14 @@ def _conf_with_docs(tmp_path_factory):
 
     folder = tmp_path_factory.mktemp("all") / "conf"
     shutil.copytree(conf_folder(), folder)
-    return shutil.copytree(OF_DOCS, folder / "experiment", dirs_exist_ok=True).parent
+    for group in ("experiment", "mixture"):
+        shutil.copytree(OF_DOCS.parent / group, folder / group, dirs_exist_ok=True)
+    return folder
 
 
 @pytest.fixture
 def all_experiments(_conf_with_docs, monkeypatch):
-    """Let experiments of the docs stand beside those of the package, as ``--config-dir docs`` does."""
+    """Let experiments and mixtures of the docs stand beside those of the package, as ``--config-dir docs`` does."""
     monkeypatch.setattr("warp_torchrl.runs.config.compose.conf_folder", lambda: _conf_with_docs)
 
 

@@ -10,7 +10,7 @@ import pytest
 EXAMPLES = Path(__file__).parent.parent / "docs" / "examples"
 QUICK = {"pettingzoo_round_trip", "frame_stack_torchrl", "training_loop"}
 CASES = {  # packages that it needs, steps, what it prints
-    "training_loop": ((), 768, r"768 steps, \d+\.\d% of the trees saved"),
+    "training_loop": ((), 1024, r"1024 steps, \d+\.\d% of the trees saved"),
     "supersuit_sb3_ppo": (("supersuit", "stable_baselines3"), 1024, r"1024 agent steps, \d+\.\d% of the trees saved"),
     "sb3_dqn": (("stable_baselines3",), 100, r"100 steps, \d+\.\d% of the trees saved"),
     "pettingzoo_round_trip": ((), 40, "40 steps, the same rewards: True"),

@@ -22,7 +22,7 @@ class _Team(MultiAgentMLP):  # one network for all agents; what they view is in 
         return super().forward(torch.cat((view.flatten(-3) / 255.0, own, picture.flatten(-3)), dim=-1))
 
 
-def main(steps: int, worlds: int, length: int = 64) -> None:
+def main(steps: int, worlds: int, length: int = 128) -> None:
     """Train two bulldozers."""
     torch.manual_seed(0)
     env = make_env("skirmish", n_worlds=worlds)

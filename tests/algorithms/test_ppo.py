@@ -156,7 +156,7 @@ def test_a_few_updates_raise_the_return_of_a_bandit(make_small_env):
     now = env.reset()
     wanted = 10  # stay, which is always open
     shares = []
-    for _ in range(15):
+    for _ in range(20):
         steps = []
         for _ in range(8):
             with torch.no_grad():

@@ -100,6 +100,6 @@ def test_a_keyword_that_does_not_fit_is_refused_in_a_line(keywords, told):
 
 
 def test_scenarios_and_baselines_have_a_sentence_each():
-    assert scenarios()["skirmish"] == "Two bulldozers, one fire, 16 x 16."
+    assert scenarios()["skirmish"] == "Two bulldozers, two fires, 16 x 16."
     assert baselines()["noop"].startswith("Stays") and all(text.endswith(".") for text in baselines().values())
     assert all(text and "@package" not in text for text in {**scenarios(), **baselines()}.values())

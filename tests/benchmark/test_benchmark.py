@@ -24,7 +24,7 @@ from warp_torchrl.training.loop import Training
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.state.state import Action
 
-TINY = ["--scenario", "skirmish", "--worlds", "2", "--repeats", "1", "--set", "horizon=8", "collector.steps=4"]
+TINY = ["--scenario", "spread_skirmish", "--worlds", "2", "--repeats", "1", "--set", "horizon=8", "collector.steps=4"]
 
 
 def output(capsys, *arguments):
@@ -138,7 +138,7 @@ def test_everything_is_printed_as_json(capsys):
     ):
         for row in content[section]:
             assert row["lowest"] <= row[measure] <= row["highest"], section
-    assert content["tasks"][0]["scenario"] == "skirmish" and content["peak_memory_gib"] > 0.0
+    assert content["tasks"][0]["scenario"] == "spread_skirmish" and content["peak_memory_gib"] > 0.0
     shares = [row["share"] for row in content["profile"] if row["of"] is None]
     assert sum(shares) == pytest.approx(1.0)
 
@@ -193,7 +193,7 @@ def test_the_numpy_world_plays_the_same_law(overrides):
 
 def test_the_numpy_team_plays_and_earns_the_same():
     overrides = ["landscape.size=14", "team.n_agents=6", "observation=paper", "reward.team_share=1"]
-    env = make_env("large", n_worlds=1, seed=3, overrides=overrides)
+    env = make_env("spread_large", n_worlds=1, seed=3, overrides=overrides)
     now, state = env.reset(), env.world_state
     peer = numpy_copy(state, 0, env.world.fire, env.world.side_of_cell)
     team = NumpyTeam(peer, state.cover[0].numpy(), state.vehicles.position[0].numpy(), 3, env.reward_function)
@@ -234,7 +234,7 @@ def test_numpy_terrain_has_the_covers_shares():
 
 def test_it_calibrates_tasks(capsys):
     out = output(capsys, "tasks", "--episodes", "3", *TINY)
-    assert "| skirmish |" in out and "torchrl" in out
+    assert "| spread_skirmish |" in out and "torchrl" in out
 
 
 def test_it_pairs_the_last_heuristic_with_the_others(capsys):

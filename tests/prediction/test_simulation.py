@@ -17,7 +17,9 @@ def forest(worlds=2, side=9):
 
 
 def test_simulate_is_the_environments_fire():
-    env = make_env("skirmish", n_worlds=2, overrides=["team.n_agents=1", "steps_per_tick=1", "wind.direction=30.0"])
+    env = make_env(
+        "spread_skirmish", n_worlds=2, overrides=["team.n_agents=1", "steps_per_tick=1", "wind.direction=30.0"]
+    )
     env.reset()
     state = env.world_state
     air = (4.0 * torch.cos(torch.tensor(30.0).deg2rad()), 4.0 * torch.sin(torch.tensor(30.0).deg2rad()))

@@ -9,7 +9,7 @@ from warp_torchrl.training.evaluations import EvaluationsOnTheWay
 
 CLIMBS = [
     "curriculum=success",
-    "curriculum.over.steps_per_tick=[9,6,4]",
+    "curriculum.over.steps_per_tick=[9,6,1]",
     "curriculum.over.horizon=[12,16,20]",
     "curriculum.episodes=4",
     "curriculum.low=0.01",
@@ -66,7 +66,7 @@ def test_a_floor_of_episodes_is_of_the_target_from_the_start(tmp_path):
 def test_evaluation_plays_the_scenario_whatever_is_learned(tmp_path):
     overrides = ["evaluation.interval=64", "total_frames=64", "evaluation.mode=sampled"]
     (tmp_path / "with").mkdir()
-    easy = ["curriculum=success", "curriculum.over.ignition.count=[2,1]", "curriculum.floor=0"]
+    easy = ["curriculum=success", "curriculum.over.ignition.count=[1,2]", "curriculum.floor=0"]
     training = tiny(tmp_path / "with", *overrides, *easy)
     training.train()
     (tmp_path / "without").mkdir()
@@ -80,7 +80,7 @@ def test_evaluation_plays_the_scenario_whatever_is_learned(tmp_path):
 
 
 def test_a_baseline_plays_each_level_once_and_is_kept(tmp_path):
-    overrides = ["curriculum=regret", "curriculum.over.steps_per_tick=[30,4]", "curriculum.worlds=8", "total_frames=32"]
+    overrides = ["curriculum=regret", "curriculum.over.steps_per_tick=[30,1]", "curriculum.worlds=8", "total_frames=32"]
     training = tiny(tmp_path, *overrides, "curriculum.floor=0")
     easy, target = training.level_sampler.state.baseline
     assert easy > target + 0.02, "the fire of level 0 is seven times slower"

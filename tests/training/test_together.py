@@ -94,7 +94,7 @@ def test_two_processes_learn_from_people_together_and_go_on_exactly(tmp_path):
 
 @pytest.mark.slow
 def test_two_processes_have_one_curriculum_and_go_on_exactly(tmp_path):
-    levels = ["curriculum.over.steps_per_tick=[9,6,4]", "curriculum.over.horizon=[8,10,12]", "horizon=12"]
+    levels = ["curriculum.over.steps_per_tick=[9,6,1]", "curriculum.over.horizon=[8,10,12]", "horizon=12"]
     climbs = ["curriculum=success", *levels, "curriculum.episodes=6", "curriculum.low=0.01", "curriculum.high=0.02"]
     whole = train(tmp_path / "whole", *climbs)
     assert sorted({float(row["curriculum/level"]) for row in told(whole)}) == pytest.approx([0.2, 1.1, 2.0])

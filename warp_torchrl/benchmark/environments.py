@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from warp_torchrl.benchmark.numpy_env import NumpyFireEnv
     from warp_torchrl.env import WildfireEnv
 
-LARGE = ("large", ("team.n_agents=4", "steps_per_tick=1"))
+LARGE = ("spread_large", ("team.n_agents=4", "steps_per_tick=1"))
 """The scenario that is measured where none is asked for, and what is changed in it."""
 _EAGER, _COMPILED, _PEER = "environment", "compiled", "numpy, PettingZoo"
 _FEWEST_STEPS, _NUMPY_EPISODES = 25, 8  # in a repeat

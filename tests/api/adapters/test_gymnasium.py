@@ -11,7 +11,7 @@ from warp_torchrl.api.adapters import FireExtinguishingEnv, FireExtinguishingVec
 from warp_torchrl.runs.config.construction import ConfigError
 
 STAY = 10
-BURNS_OUT = {"steps_per_tick": 1, "horizon": 12, "landscape.size": 8, "ignition.head_start": 0}
+BURNS_OUT = {"fire": "spread", "steps_per_tick": 1, "horizon": 12, "landscape.size": 8, "ignition.head_start": 0}
 """Small fires, which end at different steps."""
 
 

@@ -22,13 +22,13 @@ def told(scenario, *overrides):
 
 
 def test_the_rules_of_default_by_hand():
-    """A tick every five steps; four stages of a tick each spread; wet for ten ticks."""
+    """A tick every step; four stages of eight ticks each spread; wet for ten times as long."""
     for its in told("default"):
         assert its == pytest.approx(
             {
-                "rule_ticks": 0.2,
-                "rule_burning": math.log2(21) / 16,
-                "rule_wet": math.log2(51) / 16,
+                "rule_ticks": 1.0,
+                "rule_burning": math.log2(33) / 16,
+                "rule_wet": math.log2(81) / 16,
                 "rule_horizon": 8 / 16,
                 "rule_tank": 0.0,
                 "rule_stride": 0.25,
@@ -46,9 +46,9 @@ def test_the_rules_of_default_by_hand():
         ("default", ["team.n_agents=8"], "rule_team", 3 / 8),
         ("default", ["landscape.size=64"], "rule_map", 6 / 16),
         ("default", ["horizon=512"], "rule_horizon", 9 / 16),
-        ("hazard", [], "rule_ticks", 1.0),
-        ("default", ["fire.burning_stages=2"], "rule_burning", math.log2(11) / 16),
-        ("default", ["fire.wet_ticks=3"], "rule_wet", 4 / 16),
+        ("spread_default", [], "rule_ticks", 0.2),
+        ("default", ["fire.burning_stages=2"], "rule_burning", math.log2(17) / 16),
+        ("default", ["fire.wet_ticks=3"], "rule_wet", math.log2(25) / 16),
     ],
 )
 def test_a_rule_that_differs_is_told(scenario, overrides, name, value):

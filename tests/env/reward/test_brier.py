@@ -16,7 +16,7 @@ pytestmark = needs("belief", "radio", "sensing")
 
 @needs("flight")
 def test_all_are_paid_for_the_skill_of_the_belief_and_each_for_its_own_near_misses():
-    env = make_env("front", n_worlds=3, overrides=[*BELIEVES, "steps_per_tick=2", "reward.near_miss=0.5"])
+    env = make_env("spread_front", n_worlds=3, overrides=[*BELIEVES, "steps_per_tick=2", "reward.near_miss=0.5"])
     now = env.reset()
     for _ in range(4):
         before = env.world_state.plane("flight", "near_misses")

@@ -24,7 +24,7 @@ def test_a_kind_is_its_scenario_with_what_differs():
         "default", 4, None, "greedy",
     )  # fmt: skip
     assert (water.name, water.world.team.n_agents, water.world.team.tank, water.teacher) == ("water", 2, 8, "local")
-    assert isinstance(water.world.wind, Wandering) and water.world.steps_per_tick == 6
+    assert isinstance(water.world.wind, Wandering) and water.world.steps_per_tick == 1
     assert plan.worlds_of_kinds(8) == [6, 2]
     assert plan.world.team.n_agents == 1, "the run's own scenario is that which is evaluated at the end"
 
@@ -80,7 +80,7 @@ def test_without_a_mixture_there_is_one_kind():
             marks=needs("sensing"),
         ),
         (["mixture.kinds={default:{},paper_sarl:{}}"], "paper_sarl: one team must see and do the same .* differs"),
-        ([TWO, "curriculum=success", "curriculum.over.steps_per_tick=[5,4]"], "mixture must be none with a curriculum"),
+        ([TWO, "curriculum=success", "curriculum.over.steps_per_tick=[2,1]"], "mixture must be none with a curriculum"),
         ([TWO, "collector=process"], "mixture must be none where workers collect"),
         ([TWO, "algorithm=dqn"], "mixture must be none where the algorithm replays"),
         ([TWO, "model.sharing=none"], "mixture must be none where each agent has a network"),
@@ -94,7 +94,7 @@ def test_a_mistake_is_one_line(overrides, line):
     assert "\n" not in str(told.value)
 
 
-SMALL = ["scenario=default", "landscape.size=12", "curriculum=success"]
+SMALL = ["scenario=spread_default", "landscape.size=12", "curriculum=success"]
 
 
 def with_levels(*overrides):
@@ -191,10 +191,10 @@ def test_what_cannot_be_is_refused_in_one_line(overrides, line):
 
 
 def test_a_policy_that_had_a_curriculum_plays_other_scenarios():
-    values = {"curriculum": {"over": {"steps_per_tick": [9, 4], "ignition": {"count": [2, 1]}}}}
+    values = {"curriculum": {"over": {"steps_per_tick": [9, 1], "ignition": {"count": [1, 2]}}}}
     record = SavedConfig(choices={"curriculum": "success"}, values=values)
-    assert run_config(plain(restore(record, ["scenario=large"]))).make_env(1, 0).world.steps_per_tick == 6
-    assert run_config(plain(restore(record))).levels[0].ignition.count == 2, "what a run resumes with"
+    assert run_config(plain(restore(record, ["scenario=spread_large"]))).make_env(1, 0).world.steps_per_tick == 6
+    assert run_config(plain(restore(record))).levels[0].ignition.count == 1, "what a run resumes with"
 
 
 def test_a_run_of_before_has_none():

@@ -74,10 +74,24 @@ def test_it_is_small_and_tells_of_no_machine(name, scenario):
 @pytest.mark.usefixtures("all_experiments")
 def test_it_is_trained_by_its_experiment(name):
     record = newest(SHIPPED / name)[0].saved_config()
-    config = compose_config("train", [f"experiment={LAST.get(name, name)}", f"seed={record.values['seed']}"])
-    expected, values = (without_targets(plain(each)) for each in (config, restore(record)))
+    its = [f"experiment={LAST.get(name, name)}", f"scenario=spread_{SCENARIOS[name]}", f"seed={record.values['seed']}"]
+    config = compose_config("train", its)
+    expected, values = (_in_old_words(without_targets(plain(each))) for each in (config, restore(record)))
     assert {name: values[name] for name in record.values} == {name: expected[name] for name in record.values}
     assert {"reward", "observation", "imitation", "algorithm", "model", "total_frames"} <= set(record.values)
+
+
+def _in_old_words(values):
+    """Return a configuration with the names that worlds of law spread had when the policies were trained."""
+    kinds = {name: {"scenario": name} | kind for name, kind in values["mixture"].get("kinds", {}).items()}
+    for kind in kinds.values():
+        kind["scenario"] = kind["scenario"].removeprefix("spread_")
+    kinds.get("hazard", {}).pop("over", None)  # its wind and alpha, which were defaults
+    return {
+        **values,
+        "scenario": values["scenario"].removeprefix("spread_"),
+        "mixture": {**values["mixture"], "kinds": kinds},
+    }
 
 
 @pytest.mark.parametrize("name", TO_PLAY)

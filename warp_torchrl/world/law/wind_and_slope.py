@@ -109,7 +109,7 @@ def head_factor(speed: Tensor, fuel: str, ffmc: float) -> Tensor:
         fuel: Fuel type, a key of ``behaviour.fbp_fuels.FUEL_TYPES``.
         ffmc: Fine fuel moisture code, 0..101.
     """
-    kind, fine = FUEL_TYPES[fuel], fine_fuel_effect(torch.tensor(float(ffmc), device=speed.device))
+    kind, fine = FUEL_TYPES[fuel], fine_fuel_effect(torch.full((), float(ffmc), device=speed.device))
     now, calm = (
         torch.log(-torch.expm1(-kind.b * spread_index(fine, _KM_PER_HOUR * each)))
         for each in (speed, torch.zeros_like(speed))
