@@ -231,7 +231,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--scenario",
         nargs="+",
-        help="by default spread_large with team.n_agents=4 steps_per_tick=1 for speed, but default for training; all for "
+        help="by default spread_large with team.n_agents=4 steps_per_tick=1 for speed, default for training; all for "
         "tasks, two for rewards",
     )
     parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="overrides, as for train.py")
