@@ -10,6 +10,7 @@ from warp_torchrl.commands import calibrate as command
 from warp_torchrl.commands.calibrate import main
 from warp_torchrl.commands.failure import DONE, IN_USE, MISTAKE
 from warp_torchrl.prediction.calibration.case import read_fire_case
+from warp_torchrl.prediction.calibration.fitting import Shrinkage
 from warp_torchrl.prediction.calibration.options import CalibrationOptions
 from warp_torchrl.runs.config.compose import option_of, plain
 from warp_torchrl.runs.config.construction import ConfigError, build
@@ -140,7 +141,7 @@ def test_a_run_keeps_a_law_of_a_user_s_own_file_by_ours_of_its_class_and_every_v
 
 def test_a_calibration_replaces_an_earlier_one_and_nothing_else(tmp_path, monkeypatch):
     out, fires = tmp_path / "out", f"fires=[{write(tmp_path / 'small', scar=scar())}]"
-    monkeypatch.setattr(command, "_fit", lambda fire, *_: (fire, 1.0))
+    monkeypatch.setattr(command, "_fit", lambda fire, *_: (fire, Shrinkage(1.0)))
     given = [fires, "fire.model=fbp", "draws=1", f"out={out}"]
     assert main([*given, "parameters=[rate_gain]"]) == DONE and (out / "fire" / "calibrated.yaml").exists()
     (out / "fire" / "own.yaml").write_text("mine")
@@ -164,7 +165,7 @@ def test_a_calibration_that_ends_in_the_middle_leaves_its_scores_alone(tmp_path,
         raise KeyboardInterrupt
 
     monkeypatch.setattr(command, "law_yaml", interrupted)
-    monkeypatch.setattr(command, "_fit", lambda fire, *_: (fire, 1.0))
+    monkeypatch.setattr(command, "_fit", lambda fire, *_: (fire, Shrinkage(1.0)))
     fires = f"fires=[{write(tmp_path / 'small', scar=scar())}]"
     with pytest.raises(KeyboardInterrupt):
         main([fires, "fire.model=fbp", "draws=1", "parameters=[rate_gain]", f"out={tmp_path / 'out'}"])

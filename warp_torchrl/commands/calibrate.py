@@ -13,12 +13,13 @@ from warp_torchrl.commands.program import PLUGINS, command_help, run_program
 from warp_torchrl.prediction.calibration.case import FireCase, read_fire_case
 from warp_torchrl.prediction.calibration.fitting import (
     SHARES,
-    best_share,
+    Shrinkage,
     check_fuel_codes,
     check_not_in_weather,
     folds,
     null_scores,
     score,
+    shrinkage,
 )
 from warp_torchrl.prediction.calibration.options import CalibrationOptions
 from warp_torchrl.prediction.calibration.parameters import Parameter, fire_at, parameters_of
@@ -77,8 +78,8 @@ def _run(arguments: Sequence[str]) -> None:
         for case in cases:
             for name, scores in _before(fire, case, options).items():
                 rows.add(case.name, name, scores)
-        law, share = _fit(fire, parameters, cases, rows, options) if parameters else (None, None)
-        page = _write(draft, rows.scores, values, files, law, parameters, share, time.perf_counter() - began)
+        law, kept = _fit(fire, parameters, cases, rows, options) if parameters else (None, None)
+        page = _write(draft, rows.scores, values, files, law, parameters, kept, time.perf_counter() - began)
         written = sorted(each.name for each in draft.iterdir())
     print(page)
     print(f"wrote {', '.join(written)} into {folder}, in {time.perf_counter() - began:.0f} s", flush=True)
@@ -114,25 +115,25 @@ def _fit(
     cases: Sequence[FireCase],
     rows: ScoreLog,
     options: CalibrationOptions,
-) -> tuple[RateFire, float]:
+) -> tuple[RateFire, Shrinkage]:
     """Fit to all fires but one in turn, and to all; score each; return the law and the share of the fit that it has."""
-    share = _share(fire, parameters, cases, rows, options) if options.leave_one_out and len(cases) > 1 else 1.0
-    if share < 1.0:
-        log.info("on fires left out %g of the fit is best", share)
+    tried = options.leave_one_out and len(cases) > 1
+    kept = _shrinkage(fire, parameters, cases, rows, options) if tried else Shrinkage(1.0)
+    log.info("%s", kept)
     moved = options.fit(fire, parameters, cases, _progress("all fires"))
-    law = fire_at(fire, parameters, share * moved)
+    law = fire_at(fire, parameters, kept.share * moved)
     for case in cases:
         rows.add(case.name, "fitted", score(law, case, options.draws, options.seed))
-    return law, share
+    return law, kept
 
 
-def _share(
+def _shrinkage(
     fire: RateFire,
     parameters: Sequence[Parameter],
     cases: Sequence[FireCase],
     rows: ScoreLog,
     options: CalibrationOptions,
-) -> float:
+) -> Shrinkage:
     """Return the share of the fit that is best on fires left out; score each fire by the share of the others."""
     found: dict[str, dict[float, Scores]] = {}
     for left_out, others in folds(cases):
@@ -142,8 +143,8 @@ def _share(
         found[left_out.name] = {SHARES[0]: rows.scores[left_out.name]["uncalibrated"], **tried}
         rows.add(left_out.name, "left out, whole fit", tried[1.0])
     for name, tried in found.items():
-        rows.add(name, "left out", tried[best_share([each for other, each in found.items() if other != name])])
-    return best_share(list(found.values()))
+        rows.add(name, "left out", tried[shrinkage([each for other, each in found.items() if other != name]).share])
+    return shrinkage(list(found.values()))
 
 
 def _progress(fires: str) -> Callable[[int, float], None]:
@@ -157,7 +158,7 @@ def _write(
     files: Sequence[Provenance],
     law: RateFire | None,
     parameters: Sequence[Parameter],
-    share: float | None,
+    kept: Shrinkage | None,
     seconds: float,
 ) -> str:
     """Write the report into a folder, and return its page."""
@@ -167,7 +168,8 @@ def _write(
     report = {
         "version": __version__,
         "parameters": found,
-        "share": share,
+        "share": kept and kept.share,
+        "left_out": kept and {"gain": kept.gain, "error": kept.error, "fires": kept.fires},
         "scores": as_numbers(rows),
         "means": means(rows),
         "files": [each.as_values for each in files],
@@ -180,7 +182,7 @@ def _write(
         (folder / LAW).parent.mkdir(exist_ok=True)
         disk.replace(folder / LAW, law_yaml(law, f"Law rate, fitted to {', '.join(rows)}."))
         page += "\n\n" + "\n".join(f"{name}: {value:.4g}" for name, value in found.items())
-        page += f"\nshare of the fit that the law has: {share:g}"
+        page += f"\n{kept}"
     page = "\n".join([page, *section([each.as_values for each in files])])
     disk.replace(folder / "calibration.md", page + "\n")
     return page

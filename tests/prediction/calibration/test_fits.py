@@ -4,12 +4,15 @@ import pytest
 import torch
 
 from tests.prediction.calibration.ground import case_of, cases_of, fire
+from warp_torchrl.commands import calibrate
 from warp_torchrl.prediction.calibration.candidates import burnable, fires_of, median_arrivals
 from warp_torchrl.prediction.calibration.evolution import Evolution
 from warp_torchrl.prediction.calibration.expected import burning_probability, differentiated, margin
-from warp_torchrl.prediction.calibration.fitting import SHARES, best_share, check_not_in_weather, folds
+from warp_torchrl.prediction.calibration.fitting import SHARES, check_not_in_weather, folds, score, shrinkage
 from warp_torchrl.prediction.calibration.gradients import Gradients
+from warp_torchrl.prediction.calibration.options import CalibrationOptions
 from warp_torchrl.prediction.calibration.parameters import fire_at, parameters_of
+from warp_torchrl.prediction.calibration.report import ScoreLog
 from warp_torchrl.prediction.scores.scar import Scores
 from warp_torchrl.world.law.travel import NEVER
 
@@ -131,12 +134,41 @@ def test_refusals_are_one_line():
         check_not_in_weather(parameters_of(["moisture.ffmc"], start), cases)
 
 
-def test_of_shares_of_a_fit_the_best_on_fires_left_out_is_kept_and_of_equal_ones_the_least():
-    def scored(*values):
-        return {
-            share: Scores(jaccard_at_area=value, sorensen_at_area=0.0, jaccard=value)
-            for share, value in zip(SHARES, values, strict=True)
-        }
+def scored(*values):
+    """Return scores under each share of a fit."""
+    return {
+        share: Scores(jaccard_at_area=value, sorensen_at_area=0.0, jaccard=value)
+        for share, value in zip(SHARES, values, strict=True)
+    }
 
-    assert best_share([scored(0.5, 0.6, 0.7, 0.6, 0.5), scored(0.5, 0.6, 0.6, 0.5, 0.5)]) == 0.5
-    assert best_share([scored(0.5, 0.5, 0.5, 0.5, 0.5)]) == 0.0, "no fit without a gain"
+
+def test_of_shares_of_a_fit_the_best_on_fires_left_out_is_kept_and_of_equal_ones_the_least():
+    # Gains of 0.2 and 0.1: their mean is 0.15, their standard deviation 0.1 / sqrt(2), its error 0.05.
+    kept = shrinkage([scored(0.5, 0.6, 0.7, 0.6, 0.5), scored(0.5, 0.6, 0.6, 0.5, 0.5)])
+    assert (kept.share, kept.gain, kept.error) == pytest.approx((0.5, 0.15, 0.05))
+    assert str(kept).endswith("on 2 fires left out its Jaccard index is higher by 0.150 +- 0.050")
+    assert shrinkage([scored(0.5, 0.5, 0.5, 0.5, 0.5)]).share == 0.0, "no fit without a gain"
+
+
+def test_a_fit_that_gains_on_one_fire_and_loses_on_others_is_not_kept():
+    # Gains of 0.2, 0 and -0.05: their mean, 0.05, is under its standard error of 0.076.
+    kept = shrinkage([scored(0.5, 0.5, 0.5, 0.5, last) for last in (0.7, 0.5, 0.45)])
+    assert kept.share == 0.0 and "none is better than no fit" in str(kept)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("truth", "least", "most"), [(1.0, 0.9, 1.1), (2.0, 1.6, 2.4)])
+def test_twins_whose_rates_differ_about_a_gain_give_it_back(tmp_path, truth, least, most):
+    """Three fires whose own rates are 0.75, 1 and 1.33 times the gain, as fires' rates differ."""
+    names = ("slow", "middle", "fast")
+    cases = [
+        case_of(fire(rate_gain=truth * own), side=31, name=name)
+        for name, own in zip(names, (0.75, 1.0, 1.33), strict=True)
+    ]
+    options = CalibrationOptions(fires=names, parameters=("rate_gain",), draws=8, steps=4)
+    start, rows = fire(), ScoreLog(tmp_path / "scores.log", names)
+    for case in cases:
+        rows.add(case.name, "uncalibrated", score(start, case, options.draws, options.seed))
+    law, kept = calibrate._fit(start, parameters_of(options.parameters, start), cases, rows, options)
+    assert least < law.rate_gain < most
+    assert kept.fires == 3 and (kept.share > 0.0) == (truth > 1.0)

@@ -1,6 +1,8 @@
 """Scores of laws on fires, fits to all fires, and leave-one-out cross-validation."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import mean, stdev
 from typing import Protocol, cast
 
 import torch
@@ -89,10 +91,39 @@ def agreement(scores: Scores) -> float:
     return (scores.jaccard_at_area + cast("float", scores.jaccard)) / 2.0  # of a law, which has both
 
 
-def best_share(found: Sequence[Mapping[float, Scores]]) -> float:
+@dataclass(frozen=True)
+class Shrinkage:
+    """Share of a fit that a law keeps, and what that share gains on fires left out."""
+
+    share: float
+    gain: float = 0.0  # mean of ``agreement`` over that without a fit
+    error: float = 0.0  # standard error of that mean; 0 of one fire
+    fires: int = 0  # left out; 0: the share was not tried on any
+
+    def __str__(self) -> str:
+        """Return it in one line."""
+        line = f"share of the fit that the law has: {self.share:g}"
+        if not self.fires:
+            return f"{line}; not tried on fires left out"
+        if self.share == 0.0:
+            return f"{line}; on {self.fires} fires left out none is better than no fit by its standard error"
+        return (
+            f"{line}; on {self.fires} fires left out its Jaccard index is higher by {self.gain:.3f} +- {self.error:.3f}"
+        )
+
+
+def shrinkage(found: Sequence[Mapping[float, Scores]]) -> Shrinkage:
     """Return the share of a fit with the best mean agreement on fires left out; of equal ones the least.
+
+    Gains and deviations move by their logarithm, so that a share shrinks that towards the law without a fit. Where the
+    best share does not gain more than the standard error of its gain (Breiman et al. 1984, section 3.4.3), it is 0.
 
     Args:
         found: Of each fire the scores under each share of ``SHARES`` of the fit to the others.
     """
-    return max(SHARES, key=lambda share: (sum(agreement(each[share]) for each in found), -share))
+    gains = {share: [agreement(each[share]) - agreement(each[0.0]) for each in found] for share in SHARES}
+    best = max(SHARES, key=lambda share: (mean(gains[share]), -share))
+    error = stdev(gains[best]) / len(found) ** 0.5 if len(found) > 1 else 0.0
+    if mean(gains[best]) <= error:
+        return Shrinkage(0.0, fires=len(found))
+    return Shrinkage(best, mean(gains[best]), error, len(found))

@@ -141,13 +141,14 @@ def uniform_among(key: Tensor, tick: Tensor | int, stream: Stream, world: Tensor
         tick: Counter of the draw, int64 [B] or one number.
         stream: What the draw is for.
         world: The world of each draw, int64 [n].
-        index: Flat index of each draw within its world's, int64 [n].
+        index: Flat index of each draw within its world's, int32 or int64 [n] or [n, m].
 
     Returns:
-        float32 [n].
+        float32 of the shape of the index.
     """
-    low, high = _key_words(key, tick, stream)
-    return mixed(index.to(torch.int32), low.index_select(0, world), high.index_select(0, world))
+    shape = (-1, *(1 for _ in index.shape[1:]))
+    low, high = (word.index_select(0, world).view(shape) for word in _key_words(key, tick, stream))
+    return mixed(index.to(torch.int32), low, high)
 
 
 def _key_words(key: Tensor, tick: Tensor | int, stream: Stream) -> tuple[Tensor, Tensor]:

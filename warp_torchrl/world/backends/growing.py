@@ -4,7 +4,7 @@ What burns stays off the window's outermost cells but at the map's own sides. So
 tick, and all that their times follow from, lie in the window.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -12,10 +12,12 @@ import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
-from warp_torchrl.world.backends.spreading import Spreading
+from warp_torchrl.world.backends.spreading import Spreading, chosen
 from warp_torchrl.world.law.passing import steepness_from
 from warp_torchrl.world.law.travel import NEVER, NOWHERE
 from warp_torchrl.world.state.window import Window
+
+_LISTS = ("fire", "cell", "minutes", "steep", "pace")
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +56,21 @@ class Caught:
         def longer(values: Tensor) -> Tensor:
             return torch.cat((values, values[:1].expand(more)))
 
-        names = ("fire", "cell", "minutes", "steep", "pace")
-        planes: dict[str, Any] = {name: longer(getattr(self, name)) for name in names}
-        return replace(self, **planes)
+        return self._each(longer, self.count)
+
+    def some(self, which: Tensor) -> "Caught":
+        """Return some of those that are different, by their places, int64 [k]."""
+        return self._each(lambda values: values.index_select(0, which), len(which))
+
+    @classmethod
+    def joined(cls, parts: Sequence["Caught"]) -> "Caught":
+        """Return those of some ticks in one window, each of which are all different."""
+        lists: dict[str, Any] = {name: torch.cat([getattr(each, name) for each in parts]) for name in _LISTS}
+        return cls(window=parts[0].window, count=sum(each.count for each in parts), **lists)
+
+    def _each(self, change: Callable[[Tensor], Tensor], count: int) -> "Caught":
+        changed: dict[str, Any] = {name: change(getattr(self, name)) for name in _LISTS}
+        return replace(self, count=count, **changed)
 
 
 class Embers(Protocol):
@@ -141,21 +155,27 @@ class GrowingFires(Spreading):
 
     def _light(self, fire: Tensor, cell: Tensor, minutes: Tensor) -> None:
         """Light cells of the map, int64 [n], at some minutes where the fire has not come before; see ``Embers.due``."""
-        self._spotted, goes = self._lit[:0], self._going[fire]
-        fire, cell, minutes = fire[goes], cell[goes], minutes[goes]
+        self._spotted = self._lit[:0]
+        if self._most is not None:
+            fire, cell, minutes = chosen(self._going[fire], fire, cell, minutes)
         if not len(fire):
             return
         row, column = cell // self.window.map[1], cell % self.window.map[1]
         self._move(self.window.with_cells(row, column))
         place = (row - self.window.top + 1) * self._width + column - self.window.left + 1
         lit = fire * self._map + place
-        new = (self._free[lit] | self._beside[lit]) & (minutes < self._times[lit])
-        self._times.scatter_reduce_(0, lit[new], minutes[new], "amin")
-        lit = self._once(lit[new])
+        new = (self._free.index_select(0, lit) | self._beside.index_select(0, lit)) & (minutes < self._times[lit])
+        lit, minutes = chosen(new, lit, minutes)
+        if not len(lit):
+            return
+        self._times.scatter_reduce_(0, lit, minutes, "amin")
+        lit = self._once(lit)
         self._burned[lit], self._beside[lit], self._free[lit], self._near[lit] = True, False, False, NEVER
         self.minutes[lit] = self._times[lit]
         self._origins[lit] = self._place(lit)
-        self._waiting, self._joined = (each[self._beside[each]] for each in (self._waiting, self._joined))
+        self._waiting, self._joined = (
+            chosen(self._beside.index_select(0, each), each)[0] for each in (self._waiting, self._joined)
+        )
         self._changed = torch.cat((self._changed, lit))
         self._join(lit)
         self._spotted = lit

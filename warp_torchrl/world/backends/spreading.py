@@ -94,13 +94,13 @@ class Spreading:
         metric = self._metric(travel, cells)
         times, origins = self._coming(metric, cells, earliest=2.0 * self._now - end)
         differ = (times != self._times.index_select(0, cells)) | (origins != self._origins.index_select(0, cells))
-        changed, times, origins, slowness = _chosen(differ, cells, times, origins, metric[0])
+        changed, times, origins, slowness = chosen(differ, cells, times, origins, metric[0])
         self._times[changed], self._origins[changed] = times, origins
         self._near[changed] = kindling(times, slowness)
         reached = self._times.index_select(0, self._waiting) <= end
-        (lit,) = _chosen(reached, self._waiting)
+        (lit,) = chosen(reached, self._waiting)
         if len(lit):
-            (self._waiting,) = _chosen(~reached, self._waiting)
+            (self._waiting,) = chosen(~reached, self._waiting)
         self._burned[lit], self._beside[lit] = True, False
         self.minutes[lit] = self._times[lit]
         self._lit, self._changed, self._joined = lit, changed, lit[:0]
@@ -110,14 +110,14 @@ class Spreading:
 
     def _kindle(self) -> None:
         """Let the neighbours of cells that are about to burn join those that wait."""
-        (near,) = _chosen(self._near.index_select(0, self._waiting) <= self._now, self._waiting)
+        (near,) = chosen(self._near.index_select(0, self._waiting) <= self._now, self._waiting)
         self._near[near] = NEVER
         self._join(near)
 
     def _join(self, cells: Tensor) -> None:
         """Let the neighbours of cells join those that wait."""
         around = (cells + self._offsets[:, None]).flatten()
-        around = self._once(*_chosen(self._free.index_select(0, around), around))
+        around = self._once(*chosen(self._free.index_select(0, around), around))
         self._free[around], self._beside[around] = False, True
         self._waiting = torch.cat((self._waiting, around))
         self._joined = torch.cat((self._joined, around))
@@ -125,12 +125,12 @@ class Spreading:
     def _around(self, cells: Tensor) -> Tensor:
         """Return the waiting neighbours of cells, some more than once."""
         around = (cells + self._offsets[:, None]).flatten()
-        return _chosen(self._beside.index_select(0, around), around)[0]
+        return chosen(self._beside.index_select(0, around), around)[0]
 
     def _once(self, cells: Tensor) -> Tensor:
         number = torch.arange(len(cells), dtype=torch.int32, device=cells.device)
         self._slot[cells] = number
-        return _chosen(self._slot.index_select(0, cells) == number, cells)[0]
+        return chosen(self._slot.index_select(0, cells) == number, cells)[0]
 
     def _coming(self, metric: Metric, cells: Tensor, earliest: float) -> tuple[Tensor, Tensor]:
         around = (self._offsets[:, None] + cells).flatten()
@@ -198,7 +198,7 @@ class Spreading:
         return torch.where(changes, least_ratio(one, other), 1.0).view(8, -1).amin(0)
 
 
-def _chosen(which: Tensor, *lists: Tensor) -> list[Tensor]:
+def chosen(which: Tensor, *lists: Tensor) -> list[Tensor]:
     """Return the chosen numbers of some lists, [n] each; faster than to index each by truths, bool [n]."""
     place = which.nonzero()[:, 0]
     return [each.index_select(0, place) for each in lists]

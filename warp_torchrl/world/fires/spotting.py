@@ -1,19 +1,25 @@
 """Fires that embers start ahead of fires without vehicles; see ``world.behaviour.firebrands``."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import torch
 from torch import Tensor
 
 from warp_torchrl.world.arrays.random import Stream, named_key, uniform_among
 from warp_torchrl.world.backends.growing import Caught
+from warp_torchrl.world.backends.spreading import chosen
 from warp_torchrl.world.behaviour.firebrands import FLIGHT, LANDING, Firebrands, Plume
 from warp_torchrl.world.behaviour.moistures import fine_moisture
+from warp_torchrl.world.fires.smouldering import Smouldering
 from warp_torchrl.world.law.passing import HeadBehaviour, passing
 from warp_torchrl.world.state.window import COLUMNS, Window
 
 _HEAD = 4  # planes of heads that are read: rate, that of the rear, intensity and flame length
+_TOGETHER = 2048  # cells whose firebrands fly in one computation, about
+_SPARE = 0.01  # minutes, over the rounding of times
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,7 +37,8 @@ class EmberGround:
 class SpotFires:
     """Embers of some fires that smoulder until they start fires.
 
-    The draws of a cell are those of its fire and its place on the map: the same in any window, batch and tick.
+    The draws of a cell are those of its fire and its place on the map: the same in any window, batch and tick. So cells
+    of several ticks throw their firebrands together, before the first of these can start a fire.
 
     Args:
         brands: The firebrands.
@@ -40,35 +47,52 @@ class SpotFires:
     """
 
     def __init__(self, brands: Firebrands, ground: EmberGround, key: Tensor) -> None:
-        self._brands, self._ground, self._key = brands, ground, key
-        self._fire = self._cell = torch.zeros(0, dtype=torch.int64)
-        self._minutes = torch.zeros(0)
+        self._brands, self._ground, self._fires = brands, ground, len(key)
+        self._keys = {name: named_key(key, name) for name in (*FLIGHT, LANDING)}
+        self._smouldering = Smouldering()
+        self._caught: list[Caught] = []
+        self._number, self._first = 0, math.inf  # of their spell; when the first of them caught fire
         self._air: tuple[int, Window, tuple[Tensor, Tensor]] | None = None
 
     @property
     def smoulder(self) -> bool:
         """Return whether any smoulders."""
-        return bool(len(self._cell))
+        self._throw()
+        return bool(len(self._smouldering))
 
     def due(self, end: float) -> tuple[Tensor, Tensor, Tensor]:
         """Return the fires that start until a time: of which fire, in which cell of the map, and when, [n] each."""
-        now = self._minutes <= end
-        found = self._fire[now], self._cell[now], self._minutes[now]
-        self._fire, self._cell, self._minutes = self._fire[~now], self._cell[~now], self._minutes[~now]
-        return found
+        if self._first + self._brands.delay <= end + _SPARE:
+            self._throw()
+        return self._smouldering.due(end)
 
     def thrown(self, number: int, caught: Caught) -> None:
         """Let cells that have caught fire in a spell throw firebrands, and keep those that ignite something."""
+        if not caught.count:
+            return
+        if self._caught and (self._number, self._caught[0].window) != (number, caught.window):
+            self._throw()
+        self._caught.append(caught)
+        self._number, self._first = number, min(self._first, float(caught.minutes.min()))
+        if sum(each.count for each in self._caught) >= _TOGETHER:
+            self._throw()
+
+    def _throw(self) -> None:
+        """Let all cells that wait for it throw their firebrands."""
+        if not self._caught:
+            return
+        caught, self._caught, self._first = Caught.joined(self._caught), [], math.inf
         caught = caught.filled(COLUMNS)
-        if not len(caught.minutes):
-            return
-        plume = self._plume(number, caught)
-        throws = plume.number > 0.0
-        if not bool(throws.any()):
-            return
-        moisture = self._moisture(number, caught)
+        number = self._plume(self._number, caught).number[: caught.count]
+        (throws,) = chosen(number > 0.0, torch.arange(caught.count))
+        if len(throws):
+            self._fly(caught.some(throws).filled(COLUMNS))
+
+    def _fly(self, caught: Caught) -> None:
+        """Let firebrands fly from cells that all throw some."""
+        plume, moisture = self._plume(self._number, caught), self._moisture(self._number, caught)
         each = self._brands.followed
-        index = caught.cell[:, None] * each + torch.arange(each)
+        index = (caught.cell[:, None] * each + torch.arange(each)).to(torch.int32)
         draws = (self._draws(name, caught.fire, index) for name in FLIGHT)
         flight, size = self._brands.flown(plume, *draws), self._ground.cell_size
         height, width = caught.window.map
@@ -76,19 +100,22 @@ class SpotFires:
         column = (caught.cell % width)[:, None] + (flight.east / size).clamp(-width, width).round().to(torch.int64)
         on_map = (row >= 0) & (row < height) & (column >= 0) & (column < width)
         landed = row.clamp(0, height - 1) * width + column.clamp(0, width - 1)
-        burns = on_map & self._ground.fuel.flatten()[landed] & (landed != caught.cell[:, None])
-        chance = -torch.expm1(-flight.number * self._brands.ignition(moisture)[:, None]) * burns * throws[:, None]
-        which, brand = (self._draws(LANDING, caught.fire, index) < chance).nonzero(as_tuple=True)
-        new = which < caught.count
-        which, brand = which[new], brand[new]
-        self._fire = torch.cat((self._fire, caught.fire[which]))
-        self._cell = torch.cat((self._cell, landed[which, brand]))
-        self._minutes = torch.cat((self._minutes, (caught.minutes + self._brands.minutes(plume))[which]))
+        burns = on_map & self._fuel.index_select(0, landed.flatten()).view_as(landed) & (landed != caught.cell[:, None])
+        chance = -torch.expm1(-flight.number * self._brands.ignition(moisture)[:, None]) * burns
+        lands = self._draws(LANDING, caught.fire, index) < chance
+        which, brand = lands[: caught.count].nonzero(as_tuple=True)
+        minutes = caught.minutes + self._brands.minutes(plume)
+        self._smouldering.add(caught.fire[which], landed[which, brand], minutes[which])
+
+    @cached_property
+    def _fuel(self) -> Tensor:
+        return self._ground.fuel.flatten()
 
     def _plume(self, number: int, caught: Caught) -> Plume:
         group, place = self._place(caught)
         heads = self._ground.heads(number, caught.window)[:, :_HEAD].flatten(2)
-        then = HeadBehaviour(*heads[group, :, place].unbind(1))
+        at = group * heads.shape[2] + place
+        then = HeadBehaviour(*(plane.flatten().index_select(0, at) for plane in heads.unbind(1)))
         rate, intensity, flame_length = passing(caught.steep, caught.pace, then, self._ground.cell_size)
         wind = self._air_in(number, caught.window)[0].flatten(2)
         east, north = wind[group, :, place if wind.shape[2] > 1 else torch.zeros_like(place)].unbind(1)
@@ -106,7 +133,7 @@ class SpotFires:
         window, width = caught.window, caught.window.map[1]
         groups = self._ground.groups
         place = (caught.cell // width - window.top) * window.width + caught.cell % width - window.left
-        return caught.fire // max(1, len(self._key) // groups), place
+        return caught.fire // max(1, self._fires // groups), place
 
     def _air_in(self, number: int, window: Window) -> tuple[Tensor, Tensor]:
         """Return wind and moisture in a spell and a window, kept for the next tick."""
@@ -116,8 +143,4 @@ class SpotFires:
 
     def _draws(self, name: str, fire: Tensor, index: Tensor) -> Tensor:
         """Return uniform draws of some cells' firebrands, float32 [n, M]."""
-        each = index.shape[1]
-        found = uniform_among(
-            named_key(self._key, name), 0, Stream.NAMED, fire.repeat_interleave(each), index.flatten().to(torch.int32)
-        )
-        return found.view(index.shape)
+        return uniform_among(self._keys[name], 0, Stream.NAMED, fire, index)
