@@ -95,6 +95,14 @@ def _short_look_ahead(monkeypatch):
 
 
 @pytest.fixture
+def blank_figures(monkeypatch):
+    """Leave Matplotlib's figures undrawn, which takes most of the time of a short command; their files are there."""
+    figure, image = pytest.importorskip("matplotlib.figure"), pytest.importorskip("PIL.Image")
+    blank = image.new("RGB", (1, 1))
+    monkeypatch.setattr(figure.Figure, "savefig", lambda figure, file, **options: blank.save(file, "png"))
+
+
+@pytest.fixture
 def make_small_env():
     """Make an environment of small worlds; keywords of World and of WildfireEnv."""
     from warp_torchrl.env import WildfireEnv

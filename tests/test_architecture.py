@@ -44,7 +44,8 @@ def of_rooms(*rooms: str) -> list[str]:
 
 
 WORLD = of_rooms("world")
-READS_STATE = [*of_rooms("env/observation", "env/reward"), "env/metrics", "env/pictures/render", "evaluation/behaviour"]
+PICTURES = [f"env/pictures/{each}" for each in ("colours", "render", "recorder")]
+READS_STATE = [*of_rooms("env/observation", "env/reward"), "env/metrics", *PICTURES, "evaluation/behaviour"]
 
 
 def breaks(modules: Iterable[str], rule: Callable[[str], bool]) -> list[str]:
@@ -127,7 +128,7 @@ def test_the_ground_floor_knows_the_standard_library_torch_and_yaml():
 
 
 def test_what_reads_the_state_knows_only_the_world():
-    own = ("env/observation", "env/reward")
+    own = ("env/observation", "env/reward", "env/pictures")
     advice = {"env/observation/advice": ("heuristics",)}  # which know the world alone, and act for each agent
     assert not breaks(
         READS_STATE,

@@ -26,7 +26,7 @@ def blocks(page: str, language: str = "python") -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", (DOCS / page).read_text(), flags=re.DOTALL)
 
 
-def run(*command: str, folder: Path, **environment: str) -> subprocess.CompletedProcess:
+def run(*command: str, folder: Path, timeout: float = 580, **environment: str) -> subprocess.CompletedProcess:
     """Run one of Python's modules or programs in a folder, with this project or the copy that ``PYTHONPATH`` names."""
     return subprocess.run(
         [sys.executable, *command],
@@ -34,7 +34,7 @@ def run(*command: str, folder: Path, **environment: str) -> subprocess.Completed
         env={**os.environ, "OMP_NUM_THREADS": "1", "NO_MKDOCS_2_WARNING": "1", **environment},
         capture_output=True,
         text=True,
-        timeout=580,
+        timeout=timeout,
         check=False,
     )
 

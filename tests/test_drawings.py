@@ -20,6 +20,7 @@ from drawings.measures import (
 )
 from PIL import Image
 
+from tests.world.mechanics.there import needs
 from warp_torchrl.commands.failure import DISK
 from warp_torchrl.env.pictures.files import draw_figure
 from warp_torchrl.world.air.wind import Calm
@@ -46,6 +47,8 @@ SMALL = {
     "fire_sizes": {"size": 24, "trees_per_strike": 20, "fires": 60, "discard": 5},
 }
 
+BELIEVES = needs("belief", "radio", "sensing")
+
 
 @pytest.fixture
 def matplotlib():
@@ -61,12 +64,13 @@ def is_drawn(path):
 # Drawing
 
 
-@pytest.mark.parametrize("name", WORLD)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=BELIEVES if name == "belief" else ()) for name in WORLD])
 def test_every_figure_is_drawn(name, tmp_path, matplotlib):
     path = draw_figure(lambda: WORLD[name](**SMALL[name]), tmp_path / "new" / f"{name}.png")
     assert is_drawn(path)
 
 
+@BELIEVES
 @pytest.mark.parametrize("name", FILMS)
 def test_every_animation_is_drawn_step_by_step(name, tmp_path):
     FILMS[name](path := tmp_path / f"{name}.webp", overrides=("landscape.size=16", "belief.hidden=4", "horizon=4"))

@@ -1,4 +1,9 @@
-"""A mechanic stands apart: without its folder, its values in yaml files and its tests, the rest works as before."""
+"""A mechanic stands apart: without its folder, its values in yaml files and its tests, the rest works as before.
+
+A word of mechanics in the core is found without all of them: the rest of the suite is run. A word of one in another's
+code, yaml or tests is found without it alone: all scenarios, options and worlds are made, and those tests are run that
+speak of it.
+"""
 
 import re
 import shutil
@@ -13,8 +18,14 @@ APART = (
     *("sensing", "values"),
 )
 """Mechanics whose folder can be deleted."""
+OF_ALL = ("tests/test_mechanics_apart.py", "tests/test_docs.py")
+"""Tests that no deletion can pass: these, and those of the docs, which show all mechanics."""
+CONF = "tests/runs/config/test_conf.py"
+OPTIONS = ("option_builds_and_shows_every_field", "scenario_is_a_run", "experiment_is_a_run")
+"""Tests of every yaml file, ``test_every_...`` of ``CONF``."""
 TRY = """
 import pkgutil, importlib, warp_torchrl
+from tests.world.mechanics import of_mechanics
 from warp_torchrl import make_env
 from warp_torchrl.runs.config.compose import conf_folder
 from warp_torchrl.world.mechanics.table import kinds
@@ -32,6 +43,11 @@ def test_worlds_are_played():
     scenarios = {path.stem for path in (conf_folder() / "scenario").glob("*.yaml")}
     for scenario in sorted({"default", "hetero", "front", "agencies", "search", "haksar"} & scenarios):
         make_env(scenario, n_worlds=2, overrides=["landscape.size=16"]).rollout(3)
+
+
+def test_worlds_of_the_others_are_played():
+    for scenario, *overrides in of_mechanics("WORLDS").values():
+        make_env(scenario.removeprefix("scenario="), n_worlds=1, overrides=["landscape.size=16", *overrides]).rollout(1)
 """
 """Tests of the copy, in one process with those that it has."""
 
@@ -47,6 +63,7 @@ def without(folder: Path, *names: str) -> Path:
             path.write_text(re.sub(rf"^mechanics: {{{name}: .*}}\n", "", path.read_text(), flags=re.MULTILINE))
         delete_options(copy, f"world.mechanics.{name}.")
         delete_options(copy, f"\n  {name}: {{")  # of scenarios with several
+    (copy / "tests" / "test_try.py").write_text(TRY.replace("{names}", repr({*names})).replace("{copy}", str(copy)))
     return copy
 
 
@@ -59,21 +76,61 @@ def delete_options(copy: Path, text: str) -> None:
         delete_options(copy, f"\n  - {path.stem}\n")
 
 
-def passes(copy: Path, processes: str, *tests: str) -> None:
-    command = ("-m", "pytest", "-n", processes, "-p", "no:cacheprovider", *tests)
-    done = run(*command, folder=copy, PYTHONPATH=str(copy))
+def said_of(name: str, copy: Path) -> re.Pattern:
+    """Return the words of a mechanic that a copy lacks: its folder, its name, and the options that went with it."""
+    went = [path for path in (ROOT / "conf").glob("*/*.yaml") if not (copy / path.relative_to(ROOT)).exists()]
+    words = [name, *(f"{each.parent.name}={each.stem}" for each in went)]
+    words += [each.stem for each in went if each.parent.name == "scenario"]
+    return re.compile(rf"mechanics[./]{name}\b|[\"']({'|'.join(words)})[\"']")
+
+
+def speaking_of(name: str, copy: Path) -> list[str]:
+    """Return the tests of a copy that speak of a mechanic, and all tests of others whose code or tests do.
+
+    Elsewhere only tests that ask what is there can need it: all others pass without any.
+    """
+    speaks, asks = said_of(name, copy), re.compile("mechanics.there import|import of_mechanics|importorskip")
+    rooms = [copy / tree / "world" / "mechanics" for tree in ("warp_torchrl", "tests")]
+    others = {path.parent.name for room in rooms for path in room.glob("*/*.py") if speaks.search(path.read_text())}
+    found = {f"tests/world/mechanics/{each}" for each in others}
+    for path in (copy / "tests").glob("*/**/test_*.py"):
+        text = path.read_text()
+        if rooms[1] not in path.parents and asks.search(text) and speaks.search(text):
+            found.add(str(path.relative_to(copy)))
+    return sorted(found - {CONF})
+
+
+def passes(copy: Path, *tests: str) -> None:
+    done = run("-m", "pytest", "-p", "no:cacheprovider", *tests, folder=copy, timeout=7200, PYTHONPATH=str(copy))
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+def test_files_import_no_mechanic_but_that_of_their_own_folder():
+    imports = re.compile(
+        rf"^(?:from|import) (?:warp_torchrl|tests)\.world\.mechanics\.({'|'.join(APART)})\b", re.MULTILINE
+    )
+    found = [
+        (str(path), name)
+        for path in [*(ROOT / "warp_torchrl").rglob("*.py"), *(ROOT / "tests").rglob("*.py")]
+        for name in imports.findall(path.read_text())
+        if f"/world/mechanics/{name}/" not in path.as_posix()
+    ]
+    assert not found
+
+
 def test_no_word_of_them_is_imported_and_worlds_are_played(tmp_path):
-    copy = without(tmp_path, *APART)
-    tried = TRY.replace("{names}", repr(set(APART))).replace("{copy}", str(copy))
-    (copy / "tests" / "test_try.py").write_text(tried)
-    passes(copy, "0", "tests/test_try.py", "tests/test_architecture.py", "tests/world/mechanics/test_mechanic.py")
+    tries = ("tests/test_try.py", "tests/test_architecture.py", "tests/world/mechanics/test_mechanic.py")
+    passes(without(tmp_path, *APART), "-n", "0", *tries)
+
+
+@pytest.mark.slow
+def test_the_rest_of_the_suite_passes_without_all(tmp_path):
+    passes(without(tmp_path, *APART), "tests", *(f"--ignore={each}" for each in OF_ALL))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", APART)
-@pytest.mark.parametrize("room", ["world", "env", "heuristics", "evaluation", "models", "runs", "training"])
-def test_the_rest_of_the_suite_passes(tmp_path, name, room):
-    passes(without(tmp_path, name), "2", f"tests/{room}")
+def test_what_speaks_of_one_passes_without_it(tmp_path, name):
+    copy = without(tmp_path, name)
+    options = (f"{CONF}::test_every_{each}" for each in OPTIONS)
+    passes(copy, "-n", "0", "tests/test_try.py", *options, *speaking_of(name, copy))

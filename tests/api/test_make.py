@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import torch
 
+from tests.world.mechanics.there import needs
 from warp_torchrl import Array, WildfireEnv, baselines, load_policy, make_env, scenarios
 from warp_torchrl.runs.checkpoint import CheckpointError
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.world.air.wind import Calm, Uniform
-from warp_torchrl.world.mechanics.flight.flight import Flight
 
 
 def test_make_env_makes_a_scenario_with_overrides():
@@ -57,12 +57,16 @@ def test_keywords_are_options_values_and_components():
         fire="paper",
         team=dict(n_agents=3, roles=["uav", "ugv"]),
         wind=Uniform(speed=np.float64(3)),
-        mechanics=dict(flight=dict(separation=2.0)),
     )
     world = env.world
     assert (world.horizon, world.steps_per_tick, world.fire.beta, env.n_agents) == (7, 2, 0.65, 3)
     assert world.team.roles == ("uav", "ugv") and world.wind == Uniform(speed=3.0)
-    assert [each.separation for each in world.mechanics if isinstance(each, Flight)] == [2.0]
+
+
+@needs("flight")
+def test_a_mechanic_is_given_by_its_keys():
+    world = make_env("skirmish", mechanics=dict(flight=dict(separation=2.0))).world
+    assert [each.separation for each in world.mechanics if each.name == "flight"] == [2.0]
 
 
 COVER = np.full((20, 24), 2)

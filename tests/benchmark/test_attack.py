@@ -2,9 +2,11 @@
 
 import pytest
 
+from tests.world.mechanics.there import needs_scenario
 from warp_torchrl.benchmark.attack import VALUES, attack_table, draw_attack, escapes
 from warp_torchrl.runs.config.construction import ConfigError
 
+pytestmark = needs_scenario("initial_attack")
 SMALL = ("landscape.size=16", "horizon=30", "mechanics.values.escape_area=2", "fire.fire_deviation=0")
 
 

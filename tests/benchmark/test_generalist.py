@@ -8,6 +8,7 @@ from PIL import Image
 
 from warp_torchrl import load_policy, make_env
 from warp_torchrl.benchmark import __main__ as command
+from warp_torchrl.benchmark import measures
 from warp_torchrl.benchmark.generalist import PLACES, ScenarioVariant, generalist_table, on_ground, table_line
 from warp_torchrl.benchmark.generalist_figure import draw_generalist
 from warp_torchrl.evaluation.play import play, play_heuristics
@@ -19,7 +20,7 @@ TWO = {"scenarios": (ScenarioVariant("skirmish", "skirmish"), ScenarioVariant("w
 
 
 def test_a_row_is_the_policy_beside_the_best_baseline_on_the_same_fires(capsys, monkeypatch):
-    monkeypatch.setattr(command, "PLACES", TWO)
+    monkeypatch.setattr(measures, "PLACES", TWO)
     monkeypatch.setattr("warp_torchrl.benchmark.generalist.RIVALS", ("noop", "coordinated"))
     command.main(["generalist", "--policy", "skirmish", "--episodes", "4", "--json", "--set", *SMALL])
     printed = capsys.readouterr()
@@ -42,7 +43,7 @@ def test_a_row_is_the_policy_beside_the_best_baseline_on_the_same_fires(capsys, 
 
 
 def test_a_specialist_is_played_with_what_it_sees_on_the_same_fires(capsys, monkeypatch):
-    monkeypatch.setattr(command, "PLACES", {"specialists": (ScenarioVariant("skirmish", "skirmish", rival="single"),)})
+    monkeypatch.setattr(measures, "PLACES", {"specialists": (ScenarioVariant("skirmish", "skirmish", rival="single"),)})
     command.main(["generalist", "--policy", "skirmish", "--episodes", "4", "--json", "--set", *SMALL])
     (row,) = json.loads(capsys.readouterr().out)["generalist"]
 
@@ -62,7 +63,7 @@ def test_a_specialist_is_played_with_what_it_sees_on_the_same_fires(capsys, monk
 def test_fires_that_do_not_fit_into_one_batch_play_in_parts(capsys, monkeypatch, rival):
     def rows(cells):
         monkeypatch.setattr("warp_torchrl.benchmark.generalist._CELLS", cells)
-        command.main(["generalist", "--policy", "skirmish", "--episodes", "5", "--json", "--set", *SMALL])
+        command.main(["generalist", "--policy", "skirmish", "--episodes", "3", "--json", "--set", *SMALL])
         return json.loads(capsys.readouterr().out)["generalist"]
 
     made = []
@@ -71,11 +72,11 @@ def test_fires_that_do_not_fit_into_one_batch_play_in_parts(capsys, monkeypatch,
         made.append(n_worlds)
         return make_env(*given, n_worlds=n_worlds, **more)
 
-    monkeypatch.setattr(command, "PLACES", {"scenarios": (ScenarioVariant("skirmish", "skirmish", rival=rival),)})
+    monkeypatch.setattr(measures, "PLACES", {"scenarios": (ScenarioVariant("skirmish", "skirmish", rival=rival),)})
     monkeypatch.setattr("warp_torchrl.benchmark.generalist.RIVALS", ("noop", "coordinated"))
     monkeypatch.setattr("warp_torchrl.benchmark.generalist.make_env", making)
-    at_once = rows(5 * 12 * 12)
-    assert max(made) == 5
+    at_once = rows(3 * 12 * 12)
+    assert max(made) == 3
     made.clear()
     assert rows(2 * 12 * 12) == at_once
     assert max(made) == 2
@@ -83,7 +84,7 @@ def test_fires_that_do_not_fit_into_one_batch_play_in_parts(capsys, monkeypatch,
 
 
 def test_one_row_of_a_group_is_played_alone(capsys, monkeypatch):
-    monkeypatch.setattr(command, "PLACES", TWO)
+    monkeypatch.setattr(measures, "PLACES", TWO)
     monkeypatch.setattr("warp_torchrl.benchmark.generalist.RIVALS", ("coordinated",))
     command.main(["generalist", "--policy", "skirmish", "--places", "windy", "--episodes", "2", "--set", *SMALL])
     assert "| windy |" in (told := capsys.readouterr().out) and "| skirmish |" not in told

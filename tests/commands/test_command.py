@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from contextlib import nullcontext
+from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -47,6 +48,12 @@ TINY = [
     "model.critic_hidden=[16]",
 ]
 
+DRAWN = (
+    "test_an_evaluation_draws_maps_of_one_ground",
+    "test_a_sweep_of_evaluations_ends_in_one_table_and_one_figure",
+)
+"""Tests of the figures."""
+
 
 def command(program, *arguments, folder):
     """Run a command in a folder of its own and return it when it has ended."""
@@ -60,6 +67,12 @@ def command(program, *arguments, folder):
         timeout=240,
         check=False,
     )
+
+
+@pytest.fixture(autouse=True)
+def _figures(request):
+    if request.function.__name__ not in DRAWN and find_spec("matplotlib") is not None:
+        request.getfixturevalue("blank_figures")
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """The command predict: from rasters and a table of weather to maps, a report and refusals in one line."""
 
 import json
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,15 @@ from warp_torchrl.world.terrain.layer import read_grid
 FIRES = Path(__file__).parents[3] / "shared" / "fires"
 SHAPE = (40, 44)
 MAPS = ("burn_probability.tif", "arrival_hours.tif", "rate.tif", "intensity.tif", "flame_length.tif")
+
+DRAWN = ("test_every_output_is_there_and_lies_where_the_fuel_does", "test_a_prediction_is_corrected_by_what_was_seen")
+"""Tests of the figures."""
+
+
+@pytest.fixture(autouse=True)
+def _figures(request):
+    if request.node.name not in DRAWN and find_spec("matplotlib") is not None:
+        request.getfixturevalue("blank_figures")
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import pytest
 from warp_torchrl.commands.command import evaluate, train
 from warp_torchrl.commands.usage import keys_help, main
 from warp_torchrl.runs.config.construction import COMPONENTS
+from warp_torchrl.world.mechanics.table import mechanics
 
 
 def told(monkeypatch, capsys, command, *words):
@@ -23,7 +24,7 @@ def test_help_has_the_keys_of_the_options_that_are_chosen(monkeypatch, capsys):
     assert "  n_worlds=7" in lines and lines[lines.index("  n_worlds=7") + 1] == "      Worlds in the batch."
     assert "  algorithm.epsilon_end=0.05" in lines and not any("algorithm.clip_epsilon" in line for line in lines)
     assert all(any(line.startswith(f"{group}={{") for line in lines) for group in (*COMPONENTS, "scenario"))
-    assert any(line.startswith("  mechanics.embers.chance=") for line in lines)
+    assert all(any(line.startswith(f"  mechanics.{name}.") for line in lines) for name in mechanics())
 
 
 def test_a_mistake_beside_it_is_told(monkeypatch, capsys):
@@ -45,7 +46,8 @@ def test_keys_of_a_group_are_those_of_each_option(capsys):
         and "  wind.speed=4" in lines
         and not any(each.startswith("  fire.") for each in lines)
     )
-    assert "mechanics.breach: " in keys_help(["mechanics"])
+    said = keys_help(["mechanics"])
+    assert all(f"mechanics.{name}: " in said for name in mechanics())
 
 
 def test_a_group_that_is_not_there_is_told(capsys):

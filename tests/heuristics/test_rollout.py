@@ -14,7 +14,6 @@ from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import Dispatch, Rollout
 from warp_torchrl.world.arrays import random
-from warp_torchrl.world.mechanics.sensing.sensing import Sight
 from warp_torchrl.world.state.state import Action, WorldState
 
 # The fire in the west has no neighbours; that in the middle ignites trees for certain at the next tick.
@@ -172,8 +171,9 @@ def believing(
     *at: tuple[int, int], drawing: str = TWO_FIRES, roles: tuple[str, ...] = ("ugv",)
 ) -> tuple[WildfireEnv, WorldState]:
     """The two fires, in a world whose agents are said to see little."""
+    sensing = pytest.importorskip("warp_torchrl.world.mechanics.sensing.sensing")
     env, state = scene(drawing, at=list(at), roles=roles)
-    env.world = replace(env.world, steps_per_tick=2, sensing=Sight())
+    env.world = replace(env.world, steps_per_tick=2, sensing=sensing.Sight())
     return env, state
 
 

@@ -7,7 +7,8 @@ import pytest
 import torch
 
 from tests.world.drawing import draw
-from warp_torchrl.env.pictures.render import fire_colours, ground_colours
+from warp_torchrl.env.pictures.colours import fire_colours
+from warp_torchrl.env.pictures.render import ground_colours
 from warp_torchrl.live import drawing
 from warp_torchrl.live.ground import ground_of
 from warp_torchrl.live.match import Match, Setting

@@ -1,5 +1,7 @@
 """The world as a whole: order of a step, bookkeeping, endings, and the same evolution wherever it runs."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import torch
@@ -109,12 +111,12 @@ def test_ticking_the_worlds_that_are_due_alone_changes_nothing(world: World) -> 
         assert not differing(some, advance(state, world.fire, world.air, mask))
 
 
-def test_a_world_alone_is_the_world_in_batches_of_7_and_64(world: World) -> None:
-    # Bit for bit, every tensor, 200 steps: seed 43 is world 3 of seven and world 43 of sixty-four.
-    many, few, alone = (start(world, seeds) for seeds in (range(64), range(40, 47), range(43, 44)))
+def test_a_world_alone_is_the_world_in_batches_of_7_and_24(world: World) -> None:
+    # Bit for bit, every tensor, 200 steps: seed 13 is world 3 of seven and world 13 of twenty-four.
+    many, few, alone = (start(world, seeds) for seeds in (range(24), range(10, 17), range(13, 14)))
     for step in range(201):
         assert differing(few[3:4], alone) == [], step
-        assert differing(many[40:47], few) == [], step
+        assert differing(many[10:17], few) == [], step
         many, few, alone = (world.step(state, chosen(world, state)).after for state in (many, few, alone))
     assert many.done.any() or world.horizon > 200
 
@@ -379,23 +381,25 @@ LEDGERS = {
 }
 
 
-@pytest.fixture(params=LEDGERS)
-def ledger_world(request: pytest.FixtureRequest) -> World:
-    return LEDGERS[request.param]
-
-
-def test_every_first_tree_is_accounted_for_at_every_step(ledger_world: World) -> None:
-    # The ledger follows each cell by what its code did; T_p + T_e + T_c + T_b + burning = N0.
-    state = start(ledger_world, range(16))
-    first = state.landscape.age > 0
-    ash = put_out = cleared = torch.zeros_like(first)
+@pytest.fixture(scope="module", params=LEDGERS)
+def ledger(request: pytest.FixtureRequest) -> list[WorldState]:
+    """Return 16 worlds of a kind before and after each of 300 steps."""
+    world = LEDGERS[request.param]
+    states = [start(world, range(16))]
     for _ in range(300):
-        after = ledger_world.step(state, chosen(ledger_world, state)).after
+        states.append(world.step(states[-1], chosen(world, states[-1])).after)
+    return states
+
+
+def test_every_first_tree_is_accounted_for_at_every_step(ledger: list[WorldState]) -> None:
+    # The ledger follows each cell by what its code did; T_p + T_e + T_c + T_b + burning = N0.
+    first = ledger[0].landscape.age > 0
+    ash = put_out = cleared = torch.zeros_like(first)
+    for state, after in pairwise(ledger):
         was, now = state.cells, after.cells
         ash = ash | (is_burning(was) & (now == 0))
         put_out = put_out | (is_burning(was) & is_tree(now))
         cleared = cleared | (is_tree(was) & (now == 0))
-        state = after
         fates = {
             "burned": first & ash,
             "cleared": first & ~ash & cleared,
@@ -403,7 +407,7 @@ def test_every_first_tree_is_accounted_for_at_every_step(ledger_world: World) ->
             "extinguished": first & ~ash & is_tree(now) & put_out,
             "preserved": first & ~ash & is_tree(now) & ~put_out,
         }
-        counts = count_trees(state)
+        counts = count_trees(after)
         for name, cells in fates.items():
             assert torch.equal(getattr(counts, name), cells.sum((1, 2), dtype=torch.int32)), name
         assert torch.equal(sum(getattr(counts, name) for name in fates), first.sum((1, 2), dtype=torch.int32))
@@ -414,10 +418,8 @@ def test_every_first_tree_is_accounted_for_at_every_step(ledger_world: World) ->
     assert cleared.any()
 
 
-def test_burned_never_unburns_and_a_firebreak_stays(ledger_world: World) -> None:
-    state = start(ledger_world, range(16))
-    for _ in range(300):
-        after = ledger_world.step(state, chosen(ledger_world, state)).after
+def test_burned_never_unburns_and_a_firebreak_stays(ledger: list[WorldState]) -> None:
+    for state, after in pairwise(ledger):
         assert not (state.burned & ~after.burned).any()
         assert not (state.firebreak & ~after.firebreak).any()
         assert not (state.extinguished & ~after.extinguished).any()
@@ -425,15 +427,12 @@ def test_burned_never_unburns_and_a_firebreak_stays(ledger_world: World) -> None
         assert (after.cells[after.firebreak] == 0).all()
         assert torch.equal(after.age > 0, is_burning(after.cells))
         assert torch.equal(after.initial, state.initial)
-        state = after
 
 
-def test_cells_change_only_as_the_automaton_allows(ledger_world: World) -> None:
+def test_cells_change_only_as_the_automaton_allows(ledger: list[WorldState]) -> None:
     # From each code: a tree grows by one, catches fire or is cleared; fire goes a stage on, or out to its old age
     # (and a tick older at most); the ember turns to ash; ash grows a seedling.
-    state = start(ledger_world, range(16))
-    for _ in range(150):
-        after = ledger_world.step(state, chosen(ledger_world, state)).after
+    for state, after in pairwise(ledger):
         was, now, old_age = state.cells, after.cells, state.age
         tree, burning = is_tree(was), is_burning(was)
         as_tree = (now == was) | (now == was + 1) | (now == 11) | (now == 0)
@@ -442,7 +441,6 @@ def test_cells_change_only_as_the_automaton_allows(ledger_world: World) -> None:
         as_empty = (now == 0) | (now == 1)
         allowed = torch.where(tree, as_tree, torch.where(was == 15, as_ember, torch.where(burning, as_fire, as_empty)))
         assert allowed.all()
-        state = after
 
 
 def test_the_counts_of_trees_by_hand() -> None:

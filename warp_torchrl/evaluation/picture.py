@@ -9,7 +9,7 @@ from PIL import Image
 from tensordict.nn import TensorDictModuleBase
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.env.pictures.render import EpisodeRecorder
+from warp_torchrl.env.pictures.recorder import EpisodeRecorder
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.system import disk
 

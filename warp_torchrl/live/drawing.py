@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
-from warp_torchrl.env.pictures.render import fire_colours
+from warp_torchrl.env.pictures.colours import fire_colours
 from warp_torchrl.live.ground import SceneGround
 from warp_torchrl.world.arrays.geometry import unit_vectors
 from warp_torchrl.world.state.cells import is_burning, is_tree

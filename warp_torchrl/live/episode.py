@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.env.pictures.render import legend_colours
+from warp_torchrl.env.pictures.colours import legend_colours
 from warp_torchrl.env.pictures.veil import View, first_view, veil_colours
 from warp_torchrl.live.crew import Crew
 from warp_torchrl.live.scene import aim, furnish, local_server, map_offsets, quiet

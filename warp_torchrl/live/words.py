@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from warp_torchrl.demonstrations.summary import Summary
-from warp_torchrl.env.pictures.render import legend_colours
+from warp_torchrl.env.pictures.colours import legend_colours
 from warp_torchrl.env.pictures.veil import can_believe, veil_colours
 from warp_torchrl.live.crew import Question
 from warp_torchrl.live.drawing import VEHICLE_COLOURS

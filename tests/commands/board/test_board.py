@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from tests.world.mechanics.there import needs
 from warp_torchrl.commands.board import submit, table, tasks
 from warp_torchrl.commands.board.rows import Played, Row, read_row, write_row
 from warp_torchrl.commands.board.table import board_table, is_whole, points
@@ -149,8 +150,8 @@ def test_a_mistake_gets_one_line_and_writes_nothing(given, told, small, tmp_path
     assert not list(tmp_path.iterdir())
 
 
+@needs("belief", "radio", "sensing")
 def test_a_belief_is_chosen_where_sight_is_limited(tmp_path) -> None:
-    pytest.importorskip("warp_torchrl.world.mechanics.belief.belief")
     overrides = ("horizon=12", "landscape.size=12")
     search = a_task("two", scenario="search", overrides=overrides, rules="")
     search = replace(search, rules=search.found_rules)

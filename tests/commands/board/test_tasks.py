@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.world.mechanics.there import needs
 from warp_torchrl.commands.board.tasks import Task, boards, read_board, rules_of, world_of
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED
@@ -35,6 +36,10 @@ def test_rules_are_the_values_that_are_not_defaults() -> None:
     assert plain == rules_of(World(horizon=256)), "a default said aloud changes nothing"
     others = [World(horizon=255), World(fire=HazardFire()), World(fire=HazardFire(refinement=8))]
     assert len({plain, *map(rules_of, others)}) == 4
+
+
+@needs("embers")
+def test_mechanics_are_of_the_rules() -> None:
     assert rules_of(world_of("skirmish", ())) != rules_of(world_of("skirmish", ("mechanics.embers={}",)))
 
 

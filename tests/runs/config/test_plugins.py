@@ -12,6 +12,7 @@ from types import ModuleType
 import pytest
 from hydra.core.config_store import ConfigStore
 
+from tests.world.mechanics.there import needs
 from warp_torchrl import load_policy, make_env, register
 from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.commands.program import flag_arguments, run_program
@@ -270,6 +271,7 @@ def test_worlds_are_composed_as_a_training_composes_them(scenario):
         assert alone[key] == whole[key], key
 
 
+@needs("flight")
 def test_an_environment_of_a_training_s_keys_has_no_others(here):
     assert make_env("skirmish", n_worlds=1, overrides=["experiment=quick", "mechanics.flight={}"]).world.mechanics
     with pytest.raises(ConfigError, match="mine is not a key of the configuration"):

@@ -18,6 +18,11 @@ def needs(*mechanics: str) -> pytest.MarkDecorator:
     return pytest.mark.skipif(not is_there(*mechanics), reason=f"it needs {', '.join(mechanics)}")
 
 
+def needs_scenario(name: str) -> pytest.MarkDecorator:
+    """Return the mark of a test that needs a scenario, which goes with the mechanics that it names."""
+    return pytest.mark.skipif(not can_play([f"scenario={name}"]), reason=f"it needs scenario {name}")
+
+
 def can_play(overrides: Sequence[str]) -> bool:
     """Return whether the scenario that overrides choose is there, and the mechanics whose values they set."""
     keys = [override.partition("=") for override in overrides]

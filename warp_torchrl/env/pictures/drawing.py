@@ -15,7 +15,8 @@ import torch
 from PIL import Image
 from torch import Tensor
 
-from warp_torchrl.env.pictures.render import _ASH, _FIRE, _GROUND, render
+from warp_torchrl.env.pictures.colours import ASH, FIRE, GROUND
+from warp_torchrl.env.pictures.render import render
 from warp_torchrl.system import disk
 from warp_torchrl.world.state.state import Cover, Landscape, WorldState
 
@@ -262,11 +263,11 @@ def fire_legend(
 
     entries = {}
     for cover in covers:
-        youngest, oldest = np.array(_GROUND[cover][1:])
+        youngest, oldest = np.array(GROUND[cover][1:])
         one_colour = cover in (Cover.LAKE, Cover.BARE)
         name = cover.name.lower() if one_colour else f"{cover.name.lower()}, age 1 to 10"
         entries[name] = strip([youngest] if one_colour else np.linspace(youngest, oldest, 5))
-    entries |= {"fire, stages 1 to 5": strip(_FIRE), "ash": strip([_ASH])}
+    entries |= {"fire, stages 1 to 5": strip(FIRE), "ash": strip([ASH])}
     entries |= {name: Line2D([], [], **look) for name, look in (lines or {}).items()}
     figure.legend(
         list(entries.values()), list(entries), loc="outside lower center", ncols=3,

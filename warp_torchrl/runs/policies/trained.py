@@ -12,17 +12,12 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 from torchrl.envs.utils import ExplorationType, exploration_type, set_exploration_type
 
-from warp_torchrl.env.flat import FLAT, unflattened
 from warp_torchrl.models import (
     ACTION,
     ACTION_MASK,
     ACTION_VALUE,
-    AGENCY,
     LOGITS,
-    OBSERVATION,
     RADIO,
-    ROLE,
-    SENT,
     Signature,
     recurrent_actors,
     signature,
@@ -30,16 +25,14 @@ from warp_torchrl.models import (
 from warp_torchrl.models.canonical import Canonicalise
 from warp_torchrl.models.fitting import fitted
 from warp_torchrl.models.networks import AgentNetworks
-from warp_torchrl.models.signature import observation_key
+from warp_torchrl.runs.policies.inputs import AgentInputs, AgentObservation
 from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.system.finite import check_scores
 from warp_torchrl.system.modes import apart
-from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import Action
 
 MODES = {"sampled": ExplorationType.RANDOM, "deterministic": ExplorationType.DETERMINISTIC}
 """TorchRL's exploration type of each mode."""
-AgentObservation = np.ndarray | Mapping[str, np.ndarray]
 
 
 def scores(acted: TensorDictBase) -> Tensor | None:
@@ -157,15 +150,9 @@ class NumpyPolicy:
     """
 
     def __init__(self, policy: TrainedPolicy) -> None:
-        self._policy = policy
-        modules = list(policy.modules())
-        read = ("".join(key[len(OBSERVATION) :]) for key in policy.in_keys if key[: len(OBSERVATION)] == OBSERVATION)
-        self._entries = {name: policy.shown.observation[name] for name in read}
-        self._shapes = {name: (entry.shape, entry.dtype) for name, entry in self._entries.items()}
+        self._policy, self._inputs = policy, AgentInputs(policy.in_keys, policy.shown)
+        modules = policy.modules()
         self._n_agents = next((len(each.networks) for each in modules if isinstance(each, AgentNetworks)), None)
-        self._is_late = any(key[: len(SENT)] == SENT for key in policy.in_keys)
-        self._by_role, self._by_agency = ROLE in policy.in_keys, AGENCY in policy.in_keys
-        self._role_index = {ROLES[role].name: at for at, role in enumerate(policy.shown.roles) if role in ROLES}
         self._recurrent = recurrent_actors(policy)
         self._memory: dict[str, Tensor] = {}  # float32 [B, M] of each agent
         self._device = next(policy.parameters()).device
@@ -188,7 +175,7 @@ class NumpyPolicy:
             ValueError: If an entry is missing, or its shape or type differs from training, or the whole team or an
                 agent's role is needed and missing.
         """
-        alone = self._is_of_one(observation)
+        alone = self._inputs.is_of_one(observation)
         team: Mapping[str, Any] = {"": observation} if alone else cast("Mapping[str, Any]", observation)
         infos = {"": info or {}} if alone else (info or {})
         if not team:
@@ -198,7 +185,7 @@ class NumpyPolicy:
                 f"this policy has a network for each of {self._n_agents} agents: observations must be of all of them "
                 f"at once, got {len(team)}"
             )
-        agents = [self._of_agent(name, seen, infos.get(name, {})) for name, seen in team.items()]
+        agents = [self._inputs.of_agent(name, seen, infos.get(name, {})) for name, seen in team.items()]
         if self._policy.talks and agents[0][RADIO].shape[-2] != len(team):
             raise ValueError(
                 f"this policy's agents talk: observations must be of the whole team of {agents[0][RADIO].shape[-2]} at "
@@ -207,55 +194,6 @@ class NumpyPolicy:
         actions = self._act(list(team), agents)
         numbers = [each if each.ndim else int(each) for each in actions]
         return numbers[0] if alone else dict(zip(team, numbers))
-
-    def _is_of_one(self, observation: AgentObservation | Mapping[str, AgentObservation]) -> bool:
-        """Return whether an observation is of one agent, not of a team."""
-        if isinstance(observation, Mapping):
-            return bool({FLAT, *self._entries} & observation.keys())
-        if "" not in self._entries:
-            raise ValueError(
-                f"observation must be a dict of {', '.join(self._entries)}, got {type(observation).__name__}"
-            )
-        return True
-
-    def _of_agent(self, name: str, seen: Any, info: Mapping[str, Any]) -> dict[Any, np.ndarray]:
-        """Return the policy's inputs of one agent, by key."""
-        who = f" of {name}" if name else ""
-        is_flat = isinstance(seen, Mapping) and FLAT in seen
-        if is_flat:
-            seen = {**seen, **unflattened(np.asarray(seen[FLAT]), self._shapes, f"observation{who}")}
-        entries = {**info, **seen} if is_flat or "" not in self._entries else {"": seen, **info}
-        missing = [entry for entry in ("action_mask", *self._entries) if entry not in entries]
-        if missing:
-            where = "info" if "" in self._entries and not is_flat else "observation"
-            raise ValueError(f"{where}{who} must have {', '.join(missing)}, got {', '.join(entries) or 'nothing'}")
-        mask = np.asarray(entries["action_mask"], dtype=bool)
-        read: dict[Any, np.ndarray] = {ACTION_MASK: mask}
-        for entry, (shape, dtype, *_) in self._entries.items():
-            value, expected = np.asarray(entries[entry]), (*mask.shape[:-1], *shape)
-            if value.shape != expected or value.dtype != dtype:
-                rule = f"{entry or 'observation'}{who} must be {dtype} of shape {list(expected)}"
-                raise ValueError(f"{rule}, got {value.dtype} {list(value.shape)}")
-            read[observation_key(entry)] = value
-        if self._policy.talks:
-            read |= self._of_radio(who, info)
-        if self._by_role:
-            read[ROLE] = np.full(mask.shape[:-1], self._role(name, entries.get("status")))
-        if self._by_agency:
-            read[AGENCY] = self._agency(entries.get("status"))
-        return read
-
-    def _of_radio(self, who: str, info: Mapping[str, Any]) -> dict[Any, np.ndarray]:
-        """Return an agent's radio, and its observation at the time of sending if messages arrive late, by key."""
-        missing = [name for name in ("radio", *(["sent"] if self._is_late else [])) if name not in info]
-        if missing:
-            what = ", ".join(missing)
-            raise ValueError(f"info{who} must have {what}, since this policy's agents talk: give its infos too")
-        read = {RADIO: np.asarray(info["radio"], dtype=np.float32)}
-        if not self._is_late:
-            return read
-        sent = unflattened(np.asarray(info["sent"]), self._shapes, f"sent of info{who}")
-        return {**read, **{observation_key(entry, sent=True): value for entry, value in sent.items()}}
 
     @torch.no_grad()
     def _act(self, names: list[str], agents: list[dict[Any, np.ndarray]]) -> Iterable[np.ndarray]:
@@ -278,24 +216,3 @@ class NumpyPolicy:
         nothing = torch.zeros(*worlds, size, device=self._device)
         known = [self._memory.get(name, nothing) for name in names]
         return torch.stack([each if each.shape == nothing.shape else nothing for each in known], dim=-2)
-
-    def _role(self, name: str, own: np.ndarray | None) -> int:
-        """Return the index of an agent's role, from its name or else from its ``status``."""
-        kind = name.rpartition("_")[0]
-        if kind in self._role_index:
-            return self._role_index[kind]
-        if own is None:
-            raise ValueError(
-                f"this policy has a network for each role: observations must be in a dict by agent, such as "
-                f"{{'{next(iter(self._role_index))}_0': ...}}, got {name or 'one without a name'}"
-            )
-        told = self._entries["status"].names
-        columns = [told.index(f"role_{role}") for role in self._policy.shown.roles]
-        return int(np.asarray(own)[..., columns].reshape(-1, len(columns))[0].argmax())
-
-    def _agency(self, own: np.ndarray | None) -> np.ndarray:
-        """Return the index of the agency that an agent serves, int64 [] or [B], from its ``status``."""
-        if own is None:
-            raise ValueError("this policy has a network for each agency: observations must have self, which tells it")
-        told = self._entries["status"].names
-        return np.asarray(own)[..., [told.index(name) for name in self._policy.shown.agencies]].argmax(-1)

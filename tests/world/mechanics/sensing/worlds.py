@@ -1,11 +1,9 @@
 """Worlds of limited sight, for what is asked of all worlds."""
 
-from warp_torchrl.world.mechanics.table import mechanics
-
 TELLS_LATE = (
     "scenario=search",
     "mechanics.radio.carries=both",
     "mechanics.radio.delay=2",
     "mechanics.radio.loss=0.2",
 )
-WORLDS = {"tells late": TELLS_LATE} if "radio" in mechanics() else {}
+WORLDS = {"tells late": TELLS_LATE}
