@@ -9,6 +9,7 @@ from tests.world.mechanics.belief.drawing import believing, members
 from tests.world.mechanics.belief.worlds import alight, begun, reset, rules, stay
 from tests.world.mechanics.drawing import begun as drawn_world
 from tests.world.mechanics.drawing import later
+from tests.world.mechanics.there import needs
 from warp_torchrl import make_env
 from warp_torchrl.runs.config.compose import ConfigError
 from warp_torchrl.world.mechanics.belief.belief import Ensemble
@@ -126,8 +127,8 @@ def test_a_team_without_shared_maps_has_no_belief_of_its_own():
         Ensemble(members=0)
 
 
+@needs("radio", "sensing")
 def test_the_option_shares_maps_and_leaves_the_radio_to_the_user():
-    pytest.importorskip("warp_torchrl.world.mechanics.radio.radio")
     world = make_env("scouts", n_worlds=1, overrides=["belief=ensemble", "landscape.size=16"]).world
     assert world.hearing.sends_maps and world.hearing.is_everywhere and world.belief.of == "team"
     far = ["belief=ensemble", "mechanics.radio.range=5", "landscape.size=16"]

@@ -6,6 +6,7 @@ import torch
 from tests.conftest import small_world
 from tests.world.mechanics.belief.drawing import believing
 from tests.world.mechanics.belief.worlds import rules
+from tests.world.mechanics.there import needs
 from warp_torchrl import make_env
 from warp_torchrl.entries import Empty
 from warp_torchrl.env import WildfireEnv
@@ -78,6 +79,7 @@ def test_a_channel_that_is_chosen_and_a_feature_too_is_shown_once():
     assert {*preset.view_names} <= {*CHANNELS}
 
 
+@needs("radio", "sensing")
 def test_the_option_shows_what_a_team_believes_in_any_scenario():
     over = ["observation=believed", "belief=ensemble", "belief.members=2", "belief.hidden=4"]
     env = make_env("scouts", n_worlds=1, overrides=over)

@@ -3,6 +3,7 @@
 import pytest
 
 from tests.runs.config.test_conf import composed
+from tests.world.mechanics.there import needs
 from warp_torchrl import make_env
 from warp_torchrl.models import LOGITS, Mlp, signature
 from warp_torchrl.runs.config.construction import build
@@ -16,6 +17,7 @@ def test_networks_read_it_north_up():
         Mlp().actor(signature(env))
 
 
+@needs("sensing")
 def test_it_is_refused_where_agents_do_not_see_all():
     with pytest.raises(ValueError, match="sensing must be full with observation=at_fire"):
         make_env("haksar", n_worlds=1, overrides=["observation=at_fire", "sensing=sight"])
