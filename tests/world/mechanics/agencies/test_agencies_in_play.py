@@ -102,8 +102,8 @@ def test_a_line_parts_the_lands_of_agencies():
 
 def test_agencies_act_as_they_do_in_torchrl_and_alone():
     options = {"agencies.own": 1, "agencies.lending": "need", "agencies.term": 2}
-    ours, policy = policy_for("agencies", Mlp(actor_hidden=(32,), sharing="agency"), **options)
-    theirs, act = parallel_env("agencies", seed=3, **options), policy.numpy_policy()
+    ours, policy = policy_for("spread_agencies", Mlp(actor_hidden=(32,), sharing="agency"), **options)
+    theirs, act = parallel_env("spread_agencies", seed=3, **options), policy.numpy_policy()
     now, (seen, infos) = ours.reset(), theirs.reset()
     lent = []
     for _ in range(6):
