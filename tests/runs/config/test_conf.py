@@ -24,7 +24,7 @@ from warp_torchrl.world.air.gridded import Gridded
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.ignition.file import IgnitionFile
 from warp_torchrl.world.law.fire import Slopes
-from warp_torchrl.world.law.rate import RateFire
+from warp_torchrl.world.law.hazard import HazardFire
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.raster import Raster
@@ -89,11 +89,11 @@ def test_a_world_without_arguments_is_default_under_the_law_of_the_report():
     assert make_env().world == run_config(plain(compose_config("train", ["scenario=default"]))).world
 
 
-@pytest.mark.parametrize("name", [each for each in SCENARIOS if not each.startswith(("spread_", "paper_", "haksar"))])
-def test_in_every_scenario_but_those_of_printed_laws_more_wind_burns_more(name):
-    # The laws of which tests/world/test_laws.py and tests/world/law/test_rate.py show it.
+@pytest.mark.parametrize("name", [each for each in SCENARIOS if f"spread_{each}" in SCENARIOS])
+def test_where_a_scenario_is_one_of_law_spread_too_more_wind_burns_more_in_it(name):
+    # tests/world/test_laws.py shows it of these refinements.
     fire = build(compose_config("train", [f"scenario={name}"]).fire, "fire")
-    assert isinstance(fire, RateFire) or (fire.kernel == "fbp" and fire.refinement >= 8)
+    assert isinstance(fire, HazardFire) and fire.kernel == "fbp" and fire.refinement >= 8
 
 
 def test_no_scenario_repeats_a_default_but_its_size_which_each_landscape_has_another_of():
