@@ -39,7 +39,7 @@ WORLDS = 256
 
 
 def _speed(measure: Callable[..., Rows], options: Namespace, **more: Any) -> Rows:
-    """Measure the scenarios of the command line; without one, ``large`` with the settings of the speed targets."""
+    """Measure the scenarios of the command line; without one, ``LARGE``."""
     asked: list[tuple[str, Sequence[str]]] = [(name, ()) for name in options.scenario or ()] or [LARGE]
     return [
         row

@@ -4,6 +4,8 @@ import pytest
 
 from tests.world.mechanics.there import needs
 from warp_torchrl.commands.board.tasks import Task, boards, read_board, rules_of, world_of
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED
 from warp_torchrl.world.law.hazard import HazardFire
@@ -67,3 +69,10 @@ def test_what_is_not_there_gets_one_line(ask, told: str) -> None:
     with pytest.raises(ValueError, match=told):
         ask()
     assert issubclass(ConfigError, ValueError)
+
+
+@needs("embers")
+def test_the_mixture_of_the_board_has_worlds_of_its_tasks() -> None:
+    kinds = run_config(plain(compose_config("train", ["scenario=default", "mixture=warp_v1"]))).kinds
+    tasks = read_board("warp-v1").tasks
+    assert [rules_of(kind.world) for kind in kinds] == [tasks[kind.name].rules for kind in kinds]
