@@ -24,13 +24,8 @@ def can_act_on_fire(world: World, device: torch.device) -> Tensor:
 
 
 def seek(state: WorldState, assumed: WorldState, world: World, mask: Tensor) -> Tensor:
-    """Return the actions of agents that search, int64 [B, A].
-
-    Each goes to the cell from which it would learn most, of those that team-mates leave:
-
-        score = log(worth of the cells in sight) - log(steps to it + 8)
-
-    It extinguishes what it can.
+    """Return the actions of agents that search, int64 [B, A]: they go where it is worth most, and extinguish what they
+    can.
 
     Args:
         state: The worlds.
@@ -38,17 +33,26 @@ def seek(state: WorldState, assumed: WorldState, world: World, mask: Tensor) -> 
         world: Their rules.
         mask: The actions that do something, bool [B, A, actions].
     """
-    worth, agents = world.worth_seeing(state), mask.shape[1]
+    views, target = len(assumed.key) // len(mask), target_or_supply(state, world, worth_a_search(state, world))
+    moves = first_move(assumed, world, *(each.repeat_interleave(views, dim=0) for each in (mask, target)))
+    return extinguish_or(by_own_view(moves, views), mask)
+
+
+def worth_a_search(state: WorldState, world: World) -> Tensor:
+    """Return where each agent would learn most a step of way, of the cells that team-mates leave, int64 [B, A, 2]:
+
+        score = log(worth of the cells in sight) - log(steps to it + 8)
+
+    Worth is ``World.worth_seeing``.
+    """
+    worth, agents = world.worth_seeing(state), state.vehicles.position.shape[1]
     sights = [min(each, max(world.size)) for each in world.sensing.reach(world.team)]
     about = {each: sums_about(worth, each).flatten(2) for each in dict.fromkeys(sights)}
     sums = {each: sum_.expand(-1, agents, -1) for each, sum_ in about.items()}
     value = torch.stack([sums[each][:, agent] for agent, each in enumerate(sights)], dim=1)
-    cells = torch.arange(value.shape[2], device=mask.device).expand(len(mask), -1)
+    cells = torch.arange(value.shape[2], device=value.device).expand(len(value), -1)
     gain = value.clamp(min=_LEAST).log() - (agent_distance(state, cells) + _SETTLING).log()
-    target = match_cells(state, cells, gain, spacing=2 * max(sights) + 2, discount=_APART, taken=_TAKEN)
-    views, target = len(assumed.key) // len(mask), target_or_supply(state, world, target)
-    moves = first_move(assumed, world, *(each.repeat_interleave(views, dim=0) for each in (mask, target)))
-    return extinguish_or(by_own_view(moves, views), mask)
+    return match_cells(state, cells, gain, spacing=2 * max(sights) + 2, discount=_APART, taken=_TAKEN)
 
 
 def by_own_view(actions: Tensor, views: int) -> Tensor:

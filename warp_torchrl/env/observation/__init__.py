@@ -17,6 +17,7 @@ from warp_torchrl.env.observation.presets import (
 )
 from warp_torchrl.env.observation.status import STATUS, WIND_SCALE, number, status_vector
 from warp_torchrl.env.observation.view import egocentric_view
+from warp_torchrl.env.observation.ways import way_to_fire, way_to_search, way_to_share
 
 __all__ = [
     "CHANNELS",
@@ -48,4 +49,7 @@ __all__ = [
     "searched_for",
     "state_plane",
     "status_vector",
+    "way_to_fire",
+    "way_to_search",
+    "way_to_share",
 ]
