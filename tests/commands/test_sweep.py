@@ -10,32 +10,42 @@ from warp_torchrl.runs.config.saved_config import SavedConfig
 @pytest.mark.parametrize(
     ("overrides", "named"),
     [
-        ([], "mappo efficiency surroundings"),
-        (["algorithm=ippo", "model.sharing=none"], "ippo efficiency surroundings sharing=none"),
-        (["model.symmetry=none", "observation.radius=7"], "mappo efficiency surroundings symmetry=none radius=7"),
+        ([], "mappo efficiency guided"),
+        (["algorithm=ippo", "model.sharing=none"], "ippo efficiency guided sharing=none"),
+        (["model.symmetry=none", "observation.radius=7"], "mappo efficiency guided symmetry=none radius=7"),
         (["observation=local", "observation.radius=3"], "mappo efficiency local radius=3"),
-        (["model.memory=64"], "mappo efficiency surroundings memory=64"),
-        (["observation.advice=greedy", "model.trust=0.5"], "mappo efficiency surroundings advice=greedy trust=0.5"),
-        (["observation.rules=true", "observation.near=4"], "mappo efficiency surroundings near=4 rules=true"),
-        (["mixture=all", "observation.water=true"], "mappo efficiency surroundings water=true mixture=all"),
+        (["model.memory=64"], "mappo efficiency guided memory=64"),
+        (["observation.advice=greedy", "model.trust=0.5"], "mappo efficiency guided advice=greedy trust=0.5"),
+        (
+            ["observation=surroundings", "observation.rules=true", "observation.near=4"],
+            "mappo efficiency surroundings near=4 rules=true",
+        ),
+        (
+            ["mixture=all", "observation=surroundings", "observation.water=true"],
+            "mappo efficiency surroundings water=true mixture=all",
+        ),
+        (
+            ["observation.water=false", "observation.features=[way_to_fire]"],
+            "mappo efficiency guided water=false features=[way_to_fire]",
+        ),
         (["observation=paper", "observation.radius=5"], "mappo efficiency paper radius=5"),
-        (["reward=paper", "reward.barrier_rule=printed"], "mappo paper surroundings barrier_rule=printed"),
+        (["reward=paper", "reward.barrier_rule=printed"], "mappo paper guided barrier_rule=printed"),
         (["observation=paper", "imitation.teacher=local"], "mappo efficiency paper taught by local"),
-        (["imitation.demonstrations=people"], "mappo efficiency surroundings taught by people"),
-        (["reward=agency", "reward.cooperation=-1"], "mappo agency surroundings cooperation=-1"),
-        (["reward=agency", "reward.cooperation=-1.0"], "mappo agency surroundings cooperation=-1"),
-        (["reward=agency", "reward.cooperation=0.25"], "mappo agency surroundings cooperation=0.25"),
-        (["model.messages=graph"], "mappo efficiency surroundings messages=graph"),
-        (["curriculum=success"], "mappo efficiency surroundings curriculum=success"),
+        (["imitation.demonstrations=people"], "mappo efficiency guided taught by people"),
+        (["reward=agency", "reward.cooperation=-1"], "mappo agency guided cooperation=-1"),
+        (["reward=agency", "reward.cooperation=-1.0"], "mappo agency guided cooperation=-1"),
+        (["reward=agency", "reward.cooperation=0.25"], "mappo agency guided cooperation=0.25"),
+        (["model.messages=graph"], "mappo efficiency guided messages=graph"),
+        (["curriculum=success"], "mappo efficiency guided curriculum=success"),
         (
             ["imitation.teacher=local", "imitation.demonstrations=people"],
-            "mappo efficiency surroundings taught by local and people",
+            "mappo efficiency guided taught by local and people",
         ),
     ],
 )
 def test_a_policy_is_called_by_what_is_unusual(overrides, named):
     chosen = dict(each.split("=") for each in overrides)
-    usual = {"algorithm": "mappo", "reward": "efficiency", "observation": "surroundings"}
+    usual = {"algorithm": "mappo", "reward": "efficiency", "observation": "guided"}
     usual |= dict.fromkeys(("curriculum", "mixture"), "none")
     choices = {group: chosen.get(group, option) for group, option in usual.items()}
     record = SavedConfig(choices=choices, values=plain(compose_config("train", overrides)))

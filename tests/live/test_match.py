@@ -63,7 +63,7 @@ def test_acts_of_the_vehicles_add_up_to_the_credited_ones(make_match):
 
 def test_each_side_sees_what_its_policy_was_trained_to_see_in_the_same_world():
     match = Match(Setting(policy="local", beside="default", overrides=("scenario=default",)))
-    assert [side.env.observation.radius for side in match.sides] == [5, 3]
+    assert [side.env.observation.radius for side in match.sides] == [3, 3]
     assert match.sides[0].world is match.sides[1].world is match.alone.world
 
 

@@ -116,9 +116,10 @@ def test_kinds_of_worlds_whose_messages_come_at_once_and_late_differ():
 
 
 def test_a_network_for_several_kinds_reads_whole_what_any_of_them_can_fill():
-    ground, air, hills = shape("default"), shape("hetero"), shape("default", "landscape.relief=200.0")
-    assert differing(ground, air) is None and differing(ground, shape("default", "team.n_agents=7")) is None
-    assert differing(ground, shape("default", "observation.radius=3")) == "observation view"
+    seen = "observation=surroundings"
+    ground, air, hills = shape("default", seen), shape("hetero", seen), shape("default", seen, "landscape.relief=200.0")
+    assert differing(ground, air) is None and differing(ground, shape("default", seen, "team.n_agents=7")) is None
+    assert differing(ground, shape("default", seen, "observation.radius=3")) == "observation view"
     assert joint([ground, ground]) == ground
     both = joint([ground, air, hills])
     for name in ("view", "picture"):

@@ -84,7 +84,7 @@ def test_a_teacher_that_remembers_or_does_not_fit_is_refused(tmp_path):
     folder.mkdir()
     config = configured("model.memory=8", "total_frames=64", "evaluation.mode=sampled")
     record = SavedConfig(
-        choices={"algorithm": "mappo", "reward": "efficiency", "observation": "surroundings", "scenario": "skirmish"},
+        choices={"algorithm": "mappo", "reward": "efficiency", "observation": "guided", "scenario": "skirmish"},
         values={"model": {"memory": 8, "actor_hidden": [16], "critic_hidden": [16]}, "seed": 0},
     )
     Training(config, record, folder).train()

@@ -36,14 +36,20 @@ _USUAL = {
     ("reward", "cooperation"): 0.0,
 }
 """Values that a policy's name leaves out."""
-_PAPERS_RADIUS = 3
+_USUAL_OF: Mapping[str, Mapping[str, Any]] = {
+    "paper": {"radius": 3},
+    "surroundings": {"features": []},
+    "local": {"features": []},
+    "guided": {"radius": 3, "water": True, "features": ["way_to_fire", "way_to_share", "way_to_search"]},
+    "believed": {"features": ["burn_probability", "burn_soon", "disagreement", "hidden_fire"]},
+}
+"""Those of an observation, where they differ."""
 
 
 def unusual(saved_config: SavedConfig) -> list[str]:
     """Return a policy's unusual settings, and the curriculum and the mixture if it had one, as overrides."""
-    usual = _USUAL | (
-        {("observation", "radius"): _PAPERS_RADIUS} if saved_config.choices["observation"] == "paper" else {}
-    )
+    seen = _USUAL_OF.get(saved_config.choices["observation"], {})
+    usual = _USUAL | {("observation", key): value for key, value in seen.items()}
     found = {(group, key): saved_config.values.get(group, {}).get(key) for group, key in usual}
     settings = {key: value for (group, key), value in found.items() if value not in (None, usual[group, key])}
     groups = {group: saved_config.choices.get(group, "none") for group in ("curriculum", "mixture")}
@@ -55,6 +61,8 @@ def _written(value: Any) -> str:
     """Return a value as in an override, 1 and 1.0 alike."""
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, list):
+        return f"[{','.join(map(str, value))}]"
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

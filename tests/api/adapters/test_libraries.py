@@ -128,7 +128,7 @@ def test_stable_baselines3_trains_one_agent():
 def test_stable_baselines3_takes_nothing_for_a_photograph(centred):
     """Its network for photographs needs 36 x 36 pixels."""
     preprocessing = pytest.importorskip("stable_baselines3.common.preprocessing")
-    space = gym_env(overrides=[f"observation.centred={centred}"]).observation_space
+    space = gym_env(overrides=["observation=surroundings", f"observation.centred={centred}"]).observation_space
     assert not any(preprocessing.is_image_space(each) for each in space.values())
 
 

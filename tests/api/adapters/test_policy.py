@@ -126,12 +126,12 @@ def test_masked_actions_are_never_chosen():
 
 
 def test_mistakes_are_told_in_one_line():
-    _, policy = policy_for("hetero")
+    _, policy = policy_for("hetero", observation="surroundings")
     _, of_paper = policy_for("hetero", Mlp(actor_hidden=(32,), sharing="role"), observation="paper")
-    _, by_agent = policy_for("hetero", Mlp(actor_hidden=(32,), sharing="none"))
-    seen, _ = parallel_env("hetero").reset()
+    _, by_agent = policy_for("hetero", Mlp(actor_hidden=(32,), sharing="none"), observation="surroundings")
+    seen, _ = parallel_env("hetero", observation="surroundings").reset()
     flat, infos = parallel_env("hetero", observation="paper").reset()
-    one, vector = seen["uav_0"], parallel_env("hetero", layout="flat").reset()[0]["uav_0"]
+    one, vector = seen["uav_0"], parallel_env("hetero", observation="surroundings", layout="flat").reset()[0]["uav_0"]
     for call, message in [
         (lambda: policy.numpy_policy()({"view": one["view"]}), "must have action_mask, picture, status, got view"),
         (

@@ -18,7 +18,9 @@ NAMES = tuple(f"{ADVICE}{action.name.lower()}" for action in Action)
 
 
 def env_of(scenario, adviser, *overrides, n_worlds=6):
-    return make_env(scenario, n_worlds=n_worlds, overrides=[f"observation.advice={adviser}", *overrides])
+    return make_env(
+        scenario, n_worlds=n_worlds, overrides=["observation=surroundings", f"observation.advice={adviser}", *overrides]
+    )
 
 
 @pytest.mark.parametrize(
@@ -49,7 +51,9 @@ def test_a_team_that_takes_advice_saves_what_its_adviser_saves():
 
 def test_advice_comes_last_by_name_and_on_request_alone():
     def told_of(*overrides):
-        return signature(make_env("water", n_worlds=1, overrides=[*overrides])).observation["status"]
+        return signature(make_env("water", n_worlds=1, overrides=["observation=surroundings", *overrides])).observation[
+            "status"
+        ]
 
     rules = ("observation.rules=true", "observation.water=true")
     assert told_of("observation.advice=greedy").names == (*told_of().names, *NAMES)

@@ -14,7 +14,7 @@ FIRST = len(RULES.names)
 
 
 def told(scenario, *overrides):
-    env = make_env(scenario, n_worlds=2, overrides=["observation.rules=true", *overrides])
+    env = make_env(scenario, n_worlds=2, overrides=["observation=surroundings", "observation.rules=true", *overrides])
     own = env.reset()["agents", "observation", "status"]
     assert env.channel_names["status"][-FIRST:] == RULES.names
     assert torch.equal(own[:, :, -FIRST:], rules_of(env.world, env.device).expand(2, -1, -1))
@@ -63,7 +63,9 @@ def test_each_role_is_told_its_own_stride():
 
 def test_rules_are_told_on_request_alone_and_do_not_turn():
     without, with_rules = (
-        signature(make_env("default", n_worlds=1, overrides=[f"observation.rules={asked}"])).observation["status"]
+        signature(
+            make_env("default", n_worlds=1, overrides=["observation=surroundings", f"observation.rules={asked}"])
+        ).observation["status"]
         for asked in ("false", "true")
     )
     assert with_rules.names == (*without.names, *RULES.names)

@@ -78,7 +78,9 @@ def test_a_tank_fills_where_the_way_to_water_ends_and_nowhere_else():
 
 def test_it_is_told_on_request_alone_after_the_rules():
     def told_of(*overrides):
-        return signature(make_env("water", n_worlds=1, overrides=[*overrides])).observation["status"]
+        return signature(make_env("water", n_worlds=1, overrides=["observation=surroundings", *overrides])).observation[
+            "status"
+        ]
 
     assert told_of("observation.water=true").names == (*told_of().names, *NAMES)
     both = told_of("observation.water=true", "observation.rules=true")
@@ -86,6 +88,6 @@ def test_it_is_told_on_request_alone_after_the_rules():
 
 
 def test_an_agent_is_shown_what_is_told():
-    env = make_env("water", n_worlds=3, overrides=["observation.water=true"])
+    env = make_env("water", n_worlds=3, overrides=["observation=surroundings", "observation.water=true"])
     own = env.reset()["agents", "observation", "status"]
     assert torch.equal(own[..., -3:], way_to_water(env.world_state, env.world)) and own[..., -1].any()

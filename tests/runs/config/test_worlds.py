@@ -76,7 +76,7 @@ def test_without_a_mixture_there_is_one_kind():
         (["mixture.kinds={default:{},water:{over:{team:{tank:-9}}}}"], "mixture.kinds.water: team.tank must be"),
         pytest.param(
             ["mixture.kinds={default:{},search:{}}"],
-            "search: one team must see and do the same .* observation picture",
+            "search: one team must see and do the same .* state",
             marks=needs("sensing"),
         ),
         (["mixture.kinds={default:{},paper_sarl:{}}"], "paper_sarl: one team must see and do the same .* differs"),

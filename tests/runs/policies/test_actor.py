@@ -113,5 +113,5 @@ def test_several_rounds_of_messages_are_refused():
 
 def test_the_entries_have_the_names_of_the_observation():
     policy, _ = lively(*FLOAT)
-    assert Actor(policy).entries == {name: observation_key(name) for name in ("picture", "status", "view")}
+    assert Actor(policy).entries == {name: observation_key(name) for name in ("status", "view")}
     assert Actor(lively("observation=paper")[0]).reads == ("observation", "action_mask")

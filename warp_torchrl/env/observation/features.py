@@ -6,6 +6,7 @@ shown. Specs, signatures and packings read the rows; an entry is what their func
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple, TypeVar
 
 from torch import Tensor
@@ -48,13 +49,19 @@ NOTHING_MORE = Choice()
 """What shows what every observation shows, and nothing else."""
 
 
-class Context(NamedTuple):
+@dataclass(frozen=True, eq=False)  # torch 2.11 hashes what a compiled function makes before its fields are there
+class Context:
     """What a number of ``status`` or a plane of ``state`` is computed of."""
 
     state: WorldState
     world: World
     forecast: Forecast
     choice: Choice
+
+    @cached_property
+    def assumed(self) -> WorldState:
+        """Return the worlds as agents assume them to be, see ``World.assumed``."""
+        return self.world.assumed(self.state)
 
 
 IsThere = Callable[[World, Choice], bool]

@@ -90,7 +90,7 @@ class _Known(NamedTuple):
 
 def _known(now: Context) -> _Known:
     state, world = now.state, now.world
-    assumed, place = world.assumed(state), state.vehicles.position
+    assumed, place = now.assumed if world.sensing.is_limited else state, state.vehicles.position
     agents, present = place.shape[1], on_scene(state)
     if len(assumed.key) == len(place):
         there = torch.ones_like(place[..., 0], dtype=torch.bool) if present is None else present
