@@ -15,7 +15,7 @@ SMALL = {  # in place of what the cell with the tag `parameters` sets
 }
 SAYS = {
     "fire_alone": [r"burned at the end: \d+ ha", r"8 m/s: \d+ ha, \d+ m to the east"],
-    "first_team": [r"view +\[11, 11, 11\]", r"trained, sampled", r"\d points to coordinated"],
+    "first_team": [r"view +\[11, 7, 7\]", r"trained, sampled", r"\d points to coordinated"],
 }
 
 
