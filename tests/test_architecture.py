@@ -129,7 +129,9 @@ def test_the_ground_floor_knows_the_standard_library_torch_and_yaml():
 
 def test_what_reads_the_state_knows_only_the_world():
     own = ("env/observation", "env/reward", "env/pictures")
-    advice = {f"env/observation/{each}": ("heuristics",) for each in ("advice", "ways")}  # which know the world alone, and act for each agent
+    advice = {
+        f"env/observation/{each}": ("heuristics",) for each in ("advice", "ways")
+    }  # which know the world alone, and act for each agent
     assert not breaks(
         READS_STATE,
         lambda module: knows_only(

@@ -11,15 +11,15 @@ from torchrl.objectives.multiagent import MAPPOLoss
 
 from warp_torchrl import make_env
 
-SEEN = [("agents", "observation", name) for name in ("view", "status", "picture")]
+SEEN = [("agents", "observation", name) for name in ("view", "status")]
 NAMES = ("action", "sample_log_prob", "reward", "value", "advantage", "value_target")
 LOGITS, MASK = ("agents", "logits"), ("agents", "action_mask")
 KEYS = {name: ("agents", name) for name in NAMES}
 
 
 class _Team(MultiAgentMLP):  # one network for all agents; what they view is in bytes
-    def forward(self, view, own, picture):
-        return super().forward(torch.cat((view.flatten(-3) / 255.0, own, picture.flatten(-3)), dim=-1))
+    def forward(self, view, own):
+        return super().forward(torch.cat((view.flatten(-3) / 255.0, own), dim=-1))
 
 
 def main(steps: int, worlds: int, length: int = 128) -> None:
