@@ -42,7 +42,7 @@ def test_groups_play_the_game_of_their_team():
 
 
 def test_each_group_learns_by_a_loss_of_torchrl_of_its_own():
-    env = grouped(4)
+    env = grouped(4, "observation=surroundings")
 
     def network(out):
         return nn.Sequential(nn.Flatten(-3, -1), nn.LazyLinear(8), nn.Tanh(), nn.Linear(8, out))

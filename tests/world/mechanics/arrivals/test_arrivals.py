@@ -173,8 +173,9 @@ def test_drawn_times_are_a_world_s_own_in_any_batch_and_where_nothing_is_read():
 
 def test_a_policy_and_the_baselines_play_with_a_team_that_comes_bit_by_bit():
     late = "mechanics.arrivals.minutes={bulldozer_2:8,bulldozer_3:900}"
-    env = make_env("spread_default", n_worlds=2, overrides=[late, "observation.radius=3"])
-    policy = load_policy("default", mode="deterministic").fitted(env)
+    policy = load_policy("default", mode="deterministic")
+    env = make_env("spread_default", n_worlds=2, overrides=[late, *policy.overrides])
+    policy = policy.fitted(env)
     shown = env.rollout(8, policy, break_when_any_done=False)
     action, mask = shown["agents", "action"], shown["agents", "action_mask"]
     assert mask.gather(-1, action[..., None]).all() and (action[:, :, 3] == STAY).all()

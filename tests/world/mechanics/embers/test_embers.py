@@ -166,7 +166,8 @@ def test_what_another_law_reads_is_refused():
 
 @needs("sensing", "radio", "belief")
 def test_embers_that_nobody_sees_are_shown_to_nobody_and_stand_in_no_future():
-    overrides = ["mechanics.embers.chance=0.0", "observation.features=[embers]", "belief=ensemble", "landscape.size=16"]
+    overrides = ["mechanics.embers.chance=0.0", "belief=ensemble", "landscape.size=16"]
+    overrides += ["observation=surroundings", "observation.features=[embers]"]
     env = make_env("search", n_worlds=2, overrides=overrides)
     env.reset()
     state, seen = env.world_state, in_sight(env.world_state)

@@ -22,7 +22,7 @@ GOLDEN = Path(__file__).parents[3] / "golden" / "0.1.0"
 
 
 def test_a_battery_is_shown_where_it_runs_down():
-    scouts = ["team.roles=[scout,ugv]", "landscape.size=32"]
+    scouts = ["observation=surroundings", "team.roles=[scout,ugv]", "landscape.size=32"]
     plain = make_env("default", n_worlds=2, overrides=scouts)
     env = make_env("default", n_worlds=2, overrides=[*scouts, "mechanics.flight.battery=10"])
     names = env.channel_names["status"]

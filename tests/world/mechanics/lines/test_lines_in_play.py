@@ -98,7 +98,8 @@ def test_a_firebreak_is_as_wide_as_who_built_it():
 
 
 def test_what_is_told_is_of_the_work():
-    env = make_env("skirmish", n_worlds=3, overrides=[*RATE, "mechanics.lines.gain=1", "observation.features=[line]"])
+    seen = ["observation=surroundings", "observation.features=[line]"]
+    env = make_env("skirmish", n_worlds=3, overrides=[*RATE, "mechanics.lines.gain=1", *seen])
     names = env.channel_names["status"]
     assert names[-5:] == ("line_done", "line_pace", "fire_done", "fire_pace", "flames")
     now, policy = env.reset(), HEURISTICS["dispatch"](env)
