@@ -34,6 +34,6 @@ def test_burnt_ground_fits_older_policies_and_newer_ones_need_it():
     )
     before, beside = (policy.fitted(each)(each.reset())["agents", "action"] for each in (plain, env))
     assert torch.equal(before, beside)
-    here, there = signature(make_env("skirmish", n_worlds=1)), signature(env)
+    here, there = signature(make_env("skirmish", n_worlds=1, overrides=["observation=surroundings"])), signature(env)
     with pytest.raises(ValueError, match="trained to see burnt_"):
         fitted(Mlp().actor(there), there, here, fallback=8)

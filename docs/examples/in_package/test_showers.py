@@ -48,7 +48,7 @@ def test_agents_see_the_rain_and_tables_tell_of_it():
 
 def test_an_older_policy_plays_under_showers():
     policy = load_policy("default", mode="deterministic")
-    env = make_env("showers", n_worlds=2, overrides=["mechanics.showers.radius=1", "observation.radius=3"])
+    env = make_env("showers", n_worlds=2, overrides=["mechanics.showers.radius=1", *policy.overrides])
     assert Showers(chance=0.2, radius=1) in env.world.mechanics
     env.rollout(4, policy.fitted(env))
 
