@@ -12,7 +12,7 @@ from warp_torchrl.runs.config.saved_config import SavedConfig
     [
         ([], "mappo efficiency guided"),
         (["algorithm=ippo", "model.sharing=none"], "ippo efficiency guided sharing=none"),
-        (["model.symmetry=none", "observation.radius=7"], "mappo efficiency guided symmetry=none radius=7"),
+        (["model.symmetry=none", "observation.radius=7"], "mappo efficiency guided radius=7 symmetry=none"),
         (["observation=local", "observation.radius=3"], "mappo efficiency local radius=3"),
         (["model.memory=64"], "mappo efficiency guided memory=64"),
         (["observation.advice=greedy", "model.trust=0.5"], "mappo efficiency guided advice=greedy trust=0.5"),
@@ -25,8 +25,8 @@ from warp_torchrl.runs.config.saved_config import SavedConfig
             "mappo efficiency surroundings water=true mixture=all",
         ),
         (
-            ["observation.water=false", "observation.features=[way_to_fire]"],
-            "mappo efficiency guided water=false features=[way_to_fire]",
+            ["observation.water=false", "observation.ways=[fire]"],
+            "mappo efficiency guided water=false ways=[fire]",
         ),
         (["observation=paper", "observation.radius=5"], "mappo efficiency paper radius=5"),
         (["reward=paper", "reward.barrier_rule=printed"], "mappo paper guided barrier_rule=printed"),
@@ -50,6 +50,12 @@ def test_a_policy_is_called_by_what_is_unusual(overrides, named):
     choices = {group: chosen.get(group, option) for group, option in usual.items()}
     record = SavedConfig(choices=choices, values=plain(compose_config("train", overrides)))
     assert method(record)[0] == named
+
+
+def test_a_policy_of_an_observation_that_is_not_there_is_called_by_it_alone():
+    choices = {"algorithm": "mappo", "reward": "time", "observation": "burnt"}
+    assert method(SavedConfig(choices=choices, values={"observation": {"radius": 9}}))[0] == "mappo time burnt"
+    assert method(SavedConfig(choices=choices | {"observation": "../x"}, values={}))[0] == "mappo time ../x"
 
 
 def test_a_record_from_before_a_key_tells_nothing_of_it():

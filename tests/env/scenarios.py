@@ -16,10 +16,11 @@ SMALL = ("landscape.size=16", "horizon=5")
 SCENARIOS = tuple(sorted(path.stem for path in (conf_folder() / "scenario").glob("*.yaml")))
 """Names of all scenarios."""
 FURTHER = {
-    "told all": ("scenario=water", "observation.rules=true", "observation.water=true", "observation.near=16",
-                 "observation.reach=true", "observation.advice=dispatch"),
+    "told all": ("scenario=water", "observation=surroundings", "observation.rules=true", "observation.water=true",
+                 "observation.near=16", "observation.reach=true", "observation.advice=dispatch"),
     "paper": ("scenario=skirmish", "observation=paper"),
-    "of the map": ("scenario=skirmish", "observation.centred=false", "reward=collaborative"),
+    "of the map": ("scenario=skirmish", "observation=surroundings", "observation.centred=false",
+                   "reward=collaborative"),
     "rates": ("scenario=skirmish", "fire=rate"),
     **of_mechanics("WORLDS"),
 }  # fmt: skip

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from hashlib import sha256
 from typing import Any
 
+from warp_torchrl.runs.config.compose import option_values
 from warp_torchrl.runs.config.saved_config import SavedConfig
 
 _NOT_TRAINED_BY = ("seed", "device", "evaluation", "checkpoint")
@@ -26,30 +27,20 @@ _USUAL = {
     ("model", "symmetry"): "canonical",
     ("model", "memory"): 0,
     ("model", "messages"): "none",
-    ("observation", "radius"): 5,
-    ("observation", "advice"): None,
-    ("observation", "near"): 0,
-    ("observation", "rules"): False,
-    ("observation", "water"): False,
     ("model", "trust"): 0.0,
     ("reward", "barrier_rule"): "cut_off",
     ("reward", "cooperation"): 0.0,
 }
-"""Values that a policy's name leaves out."""
-_USUAL_OF: Mapping[str, Mapping[str, Any]] = {
-    "paper": {"radius": 3},
-    "surroundings": {"features": []},
-    "local": {"features": []},
-    "guided": {"radius": 3, "water": True, "features": ["way_to_fire", "way_to_share", "way_to_search"]},
-    "believed": {"features": ["burn_probability", "burn_soon", "disagreement", "hidden_fire"]},
-}
-"""Those of an observation, where they differ."""
+"""Values that a policy's name leaves out, beside those of an observation that its option has."""
+_SEEN = ("radius", "advice", "near", "rules", "water", "ways", "features")
+"""Keys of an observation that a policy's name shows."""
 
 
 def unusual(saved_config: SavedConfig) -> list[str]:
     """Return a policy's unusual settings, and the curriculum and the mixture if it had one, as overrides."""
-    seen = _USUAL_OF.get(saved_config.choices["observation"], {})
-    usual = _USUAL | {("observation", key): value for key, value in seen.items()}
+    seen = saved_config.values.get("observation", {})
+    option = option_values("observation", saved_config.choices["observation"]) or seen
+    usual = {("observation", key): option.get(key) for key in _SEEN} | _USUAL
     found = {(group, key): saved_config.values.get(group, {}).get(key) for group, key in usual}
     settings = {key: value for (group, key), value in found.items() if value not in (None, usual[group, key])}
     groups = {group: saved_config.choices.get(group, "none") for group in ("curriculum", "mixture")}

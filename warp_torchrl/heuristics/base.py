@@ -61,12 +61,16 @@ def steps_here(state: WorldState, world: World) -> tuple[Tensor, Tensor] | None:
 
 def agent_distance(state: WorldState, cells: Tensor) -> Tensor:
     """Return the Chebyshev distance from each agent to cells [B, K], float32 [B, A, K]."""
-    row, column = state.vehicles.position.to(torch.float32)[:, :, None].unbind(dim=-1)
-    rows, columns = _rows_and_columns(cells, state)
+    return moves_between(state.vehicles.position, *rows_and_columns(cells, state))
+
+
+def moves_between(places: Tensor, rows: Tensor, columns: Tensor) -> Tensor:
+    """Return the Chebyshev distance from places, int64 [B, A, 2], to cells, float32 [B, K] each, float32 [B, A, K]."""
+    row, column = places.to(torch.float32)[:, :, None].unbind(dim=-1)
     return torch.maximum((rows[:, None] - row).abs_(), (columns[:, None] - column).abs_())
 
 
-def _rows_and_columns(cells: Tensor, state: WorldState) -> tuple[Tensor, Tensor]:
+def rows_and_columns(cells: Tensor, state: WorldState) -> tuple[Tensor, Tensor]:
     """Return the rows and the columns of flat indices, float32, each contiguous, which is fast to read."""
     width = state.cells.shape[2]
     return (cells // width).to(torch.float32), (cells % width).to(torch.float32)
@@ -209,7 +213,7 @@ def match_cells(state: WorldState, cells: Tensor, gain: Tensor, spacing: int, di
     there = on_scene(state)
     gain = gain if there is None else gain.masked_fill_(~there[..., None], -math.inf)
     claim = state.vehicles.position.clone()
-    rows, columns = _rows_and_columns(cells, state)
+    rows, columns = rows_and_columns(cells, state)
     world = torch.arange(worlds, device=cells.device)
     for _ in range(agents):
         best = gain.flatten(1).max(dim=1)

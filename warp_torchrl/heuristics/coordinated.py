@@ -39,8 +39,16 @@ class Coordinated(Heuristic):
 
     def value(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """Return each cell's value [cells of distance], float32 [B, H, W], and the fire front, bool [B, H, W]."""
-        fire = can_be_put_out(state, self.world)
         threat = self.world.forecast(state).fire_risk()
-        front = fire & (threat > 0.01)
-        front = torch.where(front.flatten(1).any(1)[:, None, None], front, fire)
-        return self.risk_weight * threat, front
+        return self.risk_weight * threat, fire_front(can_be_put_out(state, self.world), threat)
+
+
+def fire_front(fire: Tensor, risk: Tensor) -> Tensor:
+    """Return the fires from which fire is about to grow; all of them in worlds where there are none.
+
+    Args:
+        fire: The cells whose fires count, bool [B, ...].
+        risk: Their ``Forecast.fire_risk``, float32 [B, ...].
+    """
+    front = fire & (risk > 0.01)
+    return torch.where(front.flatten(1).any(1).view(-1, *[1] * (fire.ndim - 1)), front, fire)

@@ -24,8 +24,9 @@ def can_act_on_fire(world: World, device: torch.device) -> Tensor:
 
 
 def seek(state: WorldState, assumed: WorldState, world: World, mask: Tensor) -> Tensor:
-    """Return the actions of agents that search, int64 [B, A]: they go where it is worth most, and extinguish what they
-    can.
+    """Return the actions of agents that search, int64 [B, A].
+
+    Each goes where a search is worth most (``worth_a_search``), and extinguishes what it can.
 
     Args:
         state: The worlds.
@@ -55,12 +56,12 @@ def worth_a_search(state: WorldState, world: World) -> Tensor:
     return match_cells(state, cells, gain, spacing=2 * max(sights) + 2, discount=_APART, taken=_TAKEN)
 
 
-def by_own_view(actions: Tensor, views: int) -> Tensor:
-    """Return what each agent does by the map that it assumes, int64 [B, A].
+def by_own_view(told: Tensor, views: int) -> Tensor:
+    """Return what is said to each agent on the map that it assumes, [B, A, ...].
 
     Args:
-        actions: Of all agents on every map, int64 [B * views, A].
+        told: Of all agents on every map, [B * views, A, ...].
         views: Maps of a world: 1, or one of each agent.
     """
-    actions = actions.unflatten(0, (-1, views))
-    return actions[:, 0] if views == 1 else actions.diagonal(dim1=1, dim2=2)
+    told = told.unflatten(0, (-1, views))
+    return told[:, 0] if views == 1 else told.diagonal(dim1=1, dim2=2).movedim(-1, 1)

@@ -13,6 +13,7 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.observation import Context, way_to_fire, way_to_search, way_to_share
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import signature
+from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.world.air.wind import Calm
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.team.team import Team
@@ -154,7 +155,7 @@ def test_team_mates_whose_place_is_not_known_have_no_share():
 def test_the_way_to_search_is_that_of_heuristics_and_none_where_all_is_seen():
     env, state = scene(ROW, at=[(2, 3), (2, 5)])
     assert not told(way_to_search, env, state).any()
-    env = make_env("search", n_worlds=16, overrides=["observation.features=[way_to_search]"])
+    env = make_env("search", n_worlds=16, overrides=["observation.ways=[search]"])
     shown, policy, agreed, moved = env.reset(), HEURISTICS["dispatch"](env), 0, 0
     for _ in range(8):
         way = shown["agents", "observation", "status"][..., -3:]
@@ -166,3 +167,20 @@ def test_the_way_to_search_is_that_of_heuristics_and_none_where_all_is_seen():
         agreed, moved = agreed + (right * way[..., 0] > 0)[looks].sum(), moved + looks.sum()
         shown = env.step(shown)["next"]
     assert moved > 20 and agreed > 0.8 * moved
+
+
+def test_ways_are_chosen_by_name_and_stay_beside_further_features():
+    def names(*overrides):
+        return make_env("skirmish", n_worlds=1, overrides=[*overrides]).channel_names["status"]
+
+    assert names("observation.ways=[share]")[-6:] == (
+        *("water_east", "water_north", "water_distance"),
+        *("share_east", "share_north", "share_near"),
+    )
+    assert names("observation.features=[hidden_fire]")[-1] == "search_near"
+    for chosen, got in (("[fires]", "fires"), ("[fire,fire]", r"\['fire', 'fire'\]")):
+        with pytest.raises(
+            ConfigError, match=f"ways must be a list of different names of fire, .*, got {got}"
+        ) as error:
+            names(f"observation.ways={chosen}")
+        assert "\n" not in str(error.value)

@@ -28,7 +28,10 @@ AT_LENGTH = [
     ["fire=paper", "wind=wandering", "fire.growth=true", "fire.beta=50", "fire.p_regrow=0.05", "fire.wet_ticks=2"],
     ["fire=hazard", "landscape.relief=100", "wind=wandering", "team.roles=[ugv,uav]", "team.tank=3", "reward=time"],
     ["fire=paper", "observation=paper", "team.allow_stay=false", "team.extinguish_p=0.5", "reward=paper"],
-    ["fire=spread", "landscape.size=[9,16]", "observation.centred=false", "fire.neighbours=4", "reward=collaborative"],
+    [
+        *("fire=spread", "landscape.size=[9,16]", "fire.neighbours=4", "reward=collaborative"),
+        *("observation=surroundings", "observation.centred=false"),
+    ],
     *map(list, of_mechanics("WORLDS").values()),
 ]
 

@@ -32,6 +32,7 @@ class Choice:
         identity: The agent's place in its team, see ``status.identity``.
         rules: The rules of the world, see ``rules.rules_of``.
         water: The way to water, see ``water.way_to_water``.
+        ways: The ways to other places, by their names, see ``ways.WAYS``.
         advice: What a heuristic would have the agent do, see ``advice.advised_actions``, by its name; empty, none.
         reach: How soon fire and team can be where, see ``critic.reach_of_fire_and_team``; to the critic alone.
         features: Further features by name, in order.
@@ -40,6 +41,7 @@ class Choice:
     identity: bool = False
     rules: bool = False
     water: bool = False
+    ways: tuple[str, ...] = ()
     advice: str = ""
     reach: bool = False
     features: tuple[str, ...] = ()

@@ -30,6 +30,7 @@ from warp_torchrl.env.observation.features import (
 )
 from warp_torchrl.env.observation.status import STATUS, status_vector
 from warp_torchrl.env.observation.view import egocentric_view
+from warp_torchrl.env.observation.ways import check_ways
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.squares import window
 from warp_torchrl.world.state.records import read, records_of
@@ -69,6 +70,8 @@ class Local:
         rules: Whether ``status`` tells the rules of the world, see ``rules_of``: one policy can then play by several.
         water: Whether ``status`` tells the way to the nearest water, see ``way_to_water``: else agents whose tanks are
             empty know of lakes within their view alone.
+        ways: Further ways that ``status`` tells, of ``fire``, ``share`` and ``search``, see ``ways``: agents can then
+            do without a picture of the whole map.
         advice: Name of a heuristic, one of ``TEACHERS``, that tells each agent, in ``status``, the action that it would
             choose for it, see ``advised_actions``: agents may do otherwise; None has no adviser.
         reach: Whether the central critic's ``state`` tells how soon fire and team can be where, see
@@ -78,13 +81,14 @@ class Local:
         channels: Names of the view's channels, in order.
 
     Raises:
-        ValueError: If the radius is not in 1..32, or a channel, a feature or the adviser is unknown.
+        ValueError: If the radius is not in 1..32, or a channel, a feature, a way or the adviser is unknown.
     """
 
     radius: int = 5
     identity: bool = True
     rules: bool = False
     water: bool = False
+    ways: tuple[str, ...] = ()
     advice: str | None = None
     reach: bool = False
     features: tuple[str, ...] = ()
@@ -96,6 +100,7 @@ class Local:
         check_fields(self, radius=(1, 32))
         check_channels(self.channels)
         check_features(self.features, self.tables)
+        check_ways(self.ways)
         if self.advice is not None:
             check_adviser(self.advice)
 
@@ -128,6 +133,7 @@ class Local:
             identity=self.identity,
             rules=self.rules,
             water=self.water,
+            ways=self.ways,
             advice=self.advice or "",
             reach=self.reach,
             features=self.features,

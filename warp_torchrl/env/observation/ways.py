@@ -7,41 +7,61 @@ the mean. All are 0 where there is no such place. A way says where to be; ``advi
 Where sight is limited, fires are those on the map that agents assume (``World.assumed``).
 """
 
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
 from warp_torchrl.entries import Part
-from warp_torchrl.env.observation.features import Context
+from warp_torchrl.env.observation.features import Context, Function
 from warp_torchrl.env.observation.status import number
-from warp_torchrl.heuristics import Coordinated
-from warp_torchrl.heuristics.base import can_be_put_out, distance_from
-from warp_torchrl.heuristics.seeking import worth_a_search
-from warp_torchrl.world.arrays.counting import counting
+from warp_torchrl.heuristics.base import can_be_put_out, moves_between, rows_and_columns
+from warp_torchrl.heuristics.coordinated import Coordinated, fire_front
+from warp_torchrl.heuristics.seeking import by_own_view, worth_a_search
+from warp_torchrl.world.arrays.shortlist import first_cells
+from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.team.presence import on_scene
+from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.world import World
 
 _NEAR = 8.0
 """Moves at which a place is e times less near [cells]."""
 
 
-def _way(name: str) -> tuple[Part, ...]:
-    """Return the names of the numbers of a way."""
-    return Part("vector", (f"{name}_east", f"{name}_north")), Part("scalar", (f"{name}_near",))
+WAYS = ("fire", "share", "search")
+"""Names of ways, of which an observation chooses."""
 
 
-@number(_way("fire"))
+def check_ways(names: Sequence[str]) -> None:
+    """Check a choice of ways.
+
+    Raises:
+        ValueError: If one is unknown or named twice.
+    """
+    unknown = [name for name in names if name not in WAYS]
+    if unknown or len(set(names)) < len(names):
+        got = unknown[0] if unknown else list(names)
+        raise ValueError(f"ways must be a list of different names of {', '.join(WAYS)}, got {got}")
+
+
+def _way(name: str) -> Callable[[Function], Function]:
+    """Return what adds the numbers of a way to ``status``, where an observation chooses it."""
+    parts = Part("vector", (f"{name}_east", f"{name}_north")), Part("scalar", (f"{name}_near",))
+    return number(parts, lambda world, choice: name in choice.ways)
+
+
+@_way("fire")
 def way_to_fire(now: Context) -> Tensor:
     """Return the way to the nearest fire that can be put out, float32 [B, A, 3]."""
     known = _known(now)
-    fire = can_be_put_out(known.assumed, now.world)[:, None]
-    distance = distance_from(known.place, known.assumed)
-    return _told(distance.masked_fill(~fire, torch.inf), distance, known)
+    cells, burns = _fires(known.assumed, now.world)
+    moves = moves_between(known.place, *rows_and_columns(cells, known.assumed))
+    return _told(moves.masked_fill(~burns[:, None], torch.inf), moves, cells, known)
 
 
-@number(_way("share"))
+@_way("share")
 def way_to_share(now: Context) -> Tensor:
     """Return the way to the best cell of the fire front to which no team-mate is nearer, float32 [B, A, 3].
 
@@ -49,17 +69,17 @@ def way_to_share(now: Context) -> Tensor:
     has it. Of agents that are as near, the first has the cell. Agents with and without ``extinguish`` divide the front
     apart. A team-mate whose place an agent does not know has none of it.
     """
-    known, can = _known(now), now.world.team.table(now.state.cells.device).can["extinguish"]
-    value, front = Coordinated(_Worlds(now.world, known.assumed)).value(known.assumed)
-    distance = distance_from(known.place, known.assumed)
-    index = torch.arange(len(can), device=can.device)[:, None, None]
-    order = (distance * len(can) + index).masked_fill(~known.there[..., None, None], torch.inf)
-    of_kind = [order.masked_fill((can != kind)[:, None, None], torch.inf).amin(dim=1) for kind in (False, True)]
-    own = front[:, None] & (order == torch.stack(of_kind, dim=1)[:, can.long()])
-    return _told((distance - value[:, None]).masked_fill(~own, torch.inf), distance, known)
+    known = _known(now)
+    forecast = now.forecast if known.assumed is now.state else now.world.forecast(known.assumed)
+    cells, burns = _fires(known.assumed, now.world)
+    risk = forecast.fire_risk().flatten(1).gather(1, cells)
+    moves = moves_between(known.place, *rows_and_columns(cells, known.assumed))
+    own = fire_front(burns, risk)[:, None] & _is_nearest(moves, known, now.world.team)
+    cost = moves - Coordinated.risk_weight * risk[:, None]
+    return _told(cost.masked_fill(~own, torch.inf), moves, cells, known)
 
 
-@number(_way("search"))
+@_way("search")
 def way_to_search(now: Context) -> Tensor:
     """Return the way to where seeing is worth most, apart from team-mates, float32 [B, A, 3]; 0 where agents see all.
 
@@ -72,53 +92,59 @@ def way_to_search(now: Context) -> Tensor:
     return _numbers(right, -down, torch.maximum(right.abs(), down.abs()))
 
 
-class _Worlds(NamedTuple):
-    """What a heuristic reads, without an environment."""
-
-    world: World
-    shared_state: WorldState
-
-
 class _Known(NamedTuple):
     """What agents know: R maps, one of each team, or one of each agent, R = B or B * A."""
 
     assumed: WorldState
     place: Tensor  # where the agents are, int64 [R, A, 2]
-    there: Tensor  # those whose place is known, bool [R, A]
+    there: Tensor | None  # those whose place is known, bool [R, A]; None where all are
     views: int  # maps of a world
 
 
 def _known(now: Context) -> _Known:
     state, world = now.state, now.world
     assumed, place = now.assumed if world.sensing.is_limited else state, state.vehicles.position
-    agents, present = place.shape[1], on_scene(state)
     if len(assumed.key) == len(place):
-        there = torch.ones_like(place[..., 0], dtype=torch.bool) if present is None else present
-        return _Known(assumed, place, there, 1)
-    known, told = world.sensing.knows_where(state, world.team, world.hearing)
+        return _Known(assumed, place, on_scene(state), 1)
+    agents, (known, told) = place.shape[1], world.sensing.knows_where(state, world.team, world.hearing)
     self = torch.eye(agents, dtype=torch.bool, device=place.device)
     places = torch.where(self[..., None], place[:, None], told)
     return _Known(assumed, places.flatten(0, 1), (known | self).flatten(0, 1), agents)
 
 
-def _told(cost: Tensor, distance: Tensor, known: _Known) -> Tensor:
+def _fires(state: WorldState, world: World) -> tuple[Tensor, Tensor]:
+    """Return the fires that can be put out, flat indices int64 [R, K], and which are no padding, bool [R, K]."""
+    fire = can_be_put_out(state, world)
+    return first_cells(fire, fire[0].numel())
+
+
+def _is_nearest(moves: Tensor, known: _Known, team: Team) -> Tensor:
+    """Return the cells to which no other agent of its kind is nearer than each, bool [R, A, K]."""
+    can = team.table(moves.device).can["extinguish"]
+    order = moves * len(can) + torch.arange(len(can), device=moves.device)[:, None]
+    if known.there is not None:
+        order = order.masked_fill_(~known.there[..., None], torch.inf)
+    if len({"extinguish" in ROLES[role].abilities for role in team.agent_roles}) == 1:
+        return order == order.amin(dim=1, keepdim=True)
+    least = [order.masked_fill((can != kind)[:, None], torch.inf).amin(dim=1) for kind in (False, True)]
+    return order == torch.stack(least, dim=1)[:, can.long()]
+
+
+def _told(cost: Tensor, moves: Tensor, cells: Tensor, known: _Known) -> Tensor:
     """Return the numbers of the ways to the cells of the least cost, float32 [B, A, 3].
 
     Args:
-        cost: Of each cell to each agent, ``inf`` where it is no place to go, float32 [R, A, H, W].
-        distance: Moves to it, float32 [R, A, H, W].
+        cost: Of each cell to each agent, ``inf`` where it is no place to go, float32 [R, A, K].
+        moves: To it, float32 [R, A, K].
+        cells: Flat indices, int64 [R, K].
         known: What agents know.
     """
-    least = cost.flatten(2).amin(-1)[..., None, None]
+    least = cost.amin(-1, keepdim=True)
     best = ((cost == least) & (least < torch.inf)).to(torch.float32)
-    count = best.sum((2, 3)).clamp(min=1.0)
-    row, column = ((best.sum(3 - axis) * counting(best.shape[2 + axis], best)).sum(-1) / count for axis in (0, 1))
-    steps = (best * distance).sum((2, 3)) / count
-    told = _numbers(column - known.place[..., 1], known.place[..., 0] - row, steps)
-    told = told * (least[..., 0] < torch.inf)
-    if known.views == 1:
-        return told
-    return told.unflatten(0, (-1, known.views)).diagonal(dim1=1, dim2=2).mT
+    count = best.sum(-1).clamp(min=1.0)
+    row, column = ((best * each[:, None]).sum(-1) / count for each in rows_and_columns(cells, known.assumed))
+    told = _numbers(column - known.place[..., 1], known.place[..., 0] - row, (best * moves).sum(-1) / count)
+    return by_own_view(told * (least < torch.inf), known.views)
 
 
 def _numbers(east: Tensor, north: Tensor, moves: Tensor) -> Tensor:

@@ -240,6 +240,17 @@ def option_names(group: str) -> list[str]:
     return list(dict.fromkeys([*(path.stem for path in files), *registered(group)]))
 
 
+def option_values(group: str, option: str) -> dict[str, Any]:
+    """Return the values of an option: its class's defaults, and what its file says; nothing where there is none."""
+    if option not in option_names(group):
+        return {}
+    target = dict(_targets(group))[option]
+    paths = [folder / group / f"{option}.yaml" for folder in (conf_folder(), *conf_folders())]
+    said = next((plain(cast("DictConfig", OmegaConf.load(path))) for path in paths if path.is_file()), {})
+    kind = component(target)
+    return {**({} if kind is None else defaults(kind)), **said}
+
+
 def _targets(group: str) -> Iterator[tuple[str, str]]:
     """Yield the options of a group, each with the path of its class: the package's first."""
     for folder in (conf_folder(), *conf_folders()):
