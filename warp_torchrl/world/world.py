@@ -2,31 +2,20 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 from typing import TypeVar
 
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.air.wind import Uniform, Wind
 from warp_torchrl.world.arrays.batch import concatenated
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.backends import backend
 from warp_torchrl.world.backends.tick import advance, initial_state
-from warp_torchrl.world.episode_rules import EpisodeRules
-from warp_torchrl.world.ignition.ignition import Ignition, IgnitionSource
-from warp_torchrl.world.law.automaton import Automaton
-from warp_torchrl.world.law.fire import Fire
-from warp_torchrl.world.mechanics.groups import Agencies, OneAgency
 from warp_torchrl.world.mechanics.mechanic import Mechanic
+from warp_torchrl.world.parts import Parts
 from warp_torchrl.world.state.cells import count_trees, is_burning
 from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, Cover, Forecast, Transition, TreeCounts, WorldState
-from warp_torchrl.world.team.hearing import Hearing
-from warp_torchrl.world.team.knowledge import Belief, Full, Sensing
-from warp_torchrl.world.team.team import Team
-from warp_torchrl.world.terrain.landscape import Perlin
-from warp_torchrl.world.terrain.source import LandscapeSource, map_size
 
 Answer = TypeVar("Answer")
 
@@ -35,101 +24,11 @@ _CELLS_AT_ONCE = {"cpu": 2**17, "cuda": 2**20}
 
 
 @dataclass(frozen=True, kw_only=True)
-class World(EpisodeRules):
+class World(Parts):
     """The rules of a scenario. It holds no state: ``reset`` makes one, ``step`` makes the next.
 
-    Attributes:
-        landscape: Where the ground comes from.
-        wind: The air.
-        fire: The automaton.
-        team: The vehicles.
-        ignition: Where the fire starts.
-        sensing: What agents know of the fire.
-        belief: What they believe beyond that.
-        agencies: Whom the vehicles serve.
-        mechanics: What else holds in these worlds, see ``loop``.
-
-    Raises:
-        ValueError: If a value is out of its range or the team does not fit on the map.
+    Its attributes are its parts (``parts.Parts``), with the errors that they raise.
     """
-
-    landscape: LandscapeSource = field(default_factory=Perlin)
-    wind: Wind = field(default_factory=Uniform)
-    fire: Automaton = field(default_factory=Fire)
-    team: Team = field(default_factory=Team)
-    ignition: IgnitionSource = field(default_factory=Ignition)
-    sensing: Sensing = field(default_factory=Full)
-    belief: Belief = field(default_factory=Belief)
-    agencies: Agencies = field(default_factory=OneAgency)
-    mechanics: tuple[Mechanic, ...] = ()
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        height, width = self.size
-        unpaced = self.wind.over(self.landscape)  # refuses a wind that does not fit the landscape
-        object.__setattr__(self, "fire", self.fire.over(self.landscape, unpaced, self.side_of_cell))
-        _ = self.air
-        if self.team.n_agents > height * width // 4:
-            raise ValueError(
-                f"team.n_agents must be at most a quarter of the map's {height * width} cells, got {self.team.n_agents}"
-            )
-        names = [*self.fire.keeps, *(each.name for each in self.loop)]
-        if len(set(names)) < len(names):
-            raise ValueError(f"mechanics must be one of each name, got {', '.join(names)}")
-        for each in reversed(self.loop):  # the last ones build on those before, and say what the user chose
-            each.check(self)
-        _ = self.lighting  # refuses an ignition that does not fit the landscape
-        _ = self._igniting  # now: a compiled step cannot make it
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Return the map's (H, W) [cells]."""
-        return map_size(self.landscape.size)
-
-    @property
-    def is_flat(self) -> bool:
-        """Return whether the ground of every world is flat, as the landscape says; one that does not say may not be."""
-        return bool(getattr(self.landscape, "is_flat", False))
-
-    @property
-    def side_of_cell(self) -> float:
-        """Return the side of a cell in force [m]."""
-        return getattr(self.landscape, "cell_size", 30.0) if self.cell_size is None else self.cell_size
-
-    @cached_property
-    def air(self) -> Wind:
-        """Return the wind on this landscape's map."""
-        return self.wind.over(self.landscape).paced(self.fire.minutes)
-
-    @cached_property
-    def lighting(self) -> IgnitionSource:
-        """Return the ignition on this landscape's map."""
-        return self.ignition.over(self.landscape)
-
-    @cached_property
-    def hearing(self) -> Hearing:
-        """Return who hears whom: as the mechanic of them says that sets limits to it, else all hear all."""
-        return next((each for each in self.mechanics if isinstance(each, Hearing)), Hearing())
-
-    @cached_property
-    def metric_names(self) -> tuple[str, ...]:
-        """Return the names of the metrics of its mechanics."""
-        return tuple(row.name for each in self.loop for row in each.metric_rows(self))
-
-    @cached_property
-    def loop(self) -> tuple[Mechanic, ...]:
-        """Return all mechanics in the order in which they begin and step, that of their turns and names.
-
-        They are ``mechanics``, and those of the other parts that are mechanics too.
-        """
-        parts = (self.team, self.agencies, self.sensing, self.belief)
-        found = (*self.mechanics, *(each for each in parts if isinstance(each, Mechanic)))
-        return tuple(sorted(found, key=lambda each: (each.turn, each.name)))
-
-    @cached_property
-    def _igniting(self) -> tuple[Mechanic, ...]:
-        """Return the mechanics that light cells after a tick."""
-        return tuple(each for each in self.loop if type(each).after_tick is not Mechanic.after_tick)
 
     def reset(self, seed: Tensor, episode: Tensor) -> WorldState:
         """Start an episode in each world: the ground, the fire after its head start, the team.
@@ -223,7 +122,7 @@ class World(EpisodeRules):
         after, result = self.team.act(state, action, running, self.fire.last_spreading, self.fire.wet_for, self.loop)
         ticks_now = running & ((state.step + 1) % self.steps_per_tick == 0)
         after = self._tick(after, ticks_now)
-        for each in self._igniting:
+        for each in self.igniting:
             after = each.after_tick(after, ticks_now, self)
         counts_after = count_trees(after)
         after = self._advance_clock(after, counts_after, running)
@@ -294,7 +193,7 @@ class World(EpisodeRules):
     def _advance_clock(self, state: WorldState, counts: TreeCounts, running: Tensor) -> WorldState:
         step = state.step + running
         terminated = (counts.alight == 0) & self.fire.burns_out
-        for each in self._igniting:
+        for each in self.igniting:
             smoulders = each.smoulders(state)
             terminated = terminated if smoulders is None else terminated & ~smoulders
         share_burning = counts.burning / counts.initial

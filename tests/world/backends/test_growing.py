@@ -11,7 +11,8 @@ from warp_torchrl.world.backends import spells as spells_module
 from warp_torchrl.world.backends.spells import Highest, strips
 from warp_torchrl.world.backends.spreading import Spreading
 from warp_torchrl.world.fires import alone
-from warp_torchrl.world.fires.alone import Fires, arrival_minutes
+from warp_torchrl.world.fires.alone import Fires
+from warp_torchrl.world.fires.on_map import arrival_minutes
 from warp_torchrl.world.fires.spell import Spell
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER
