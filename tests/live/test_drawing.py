@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from tests.world.drawing import draw
-from warp_torchrl.env.pictures.colours import fire_colours
+from warp_torchrl.env.pictures.colours import HOUSE, LOST, fire_colours
 from warp_torchrl.env.pictures.render import ground_colours
 from warp_torchrl.live import drawing
 from warp_torchrl.live.ground import ground_of
@@ -48,6 +48,15 @@ def test_a_flame_stands_on_each_cell_that_burns_in_the_colour_of_its_stage():
     shown = drawing.flames(state, ground)
     assert shown.position.tolist() == ground.position[[5, 6, 10]].tolist()
     assert shown.colour.tolist() == fire_colours()[[0, 2, 4]].tolist()
+
+
+def test_a_house_stands_where_something_does_lower_and_darker_the_less_is_left():
+    ground = ground_of(draw("TTT TTT"))
+    shown = drawing.houses(torch.tensor([[[-1.0, 1.0, -1.0], [0.0, -1.0, 0.5]]]), ground)
+    assert shown.position.tolist() == ground.position[[1, 3, 5]].tolist()
+    assert shown.colour[:2].tolist() == [list(HOUSE), list(LOST)]
+    tall = shown.scale[:, 2] / shown.scale[:, 0]
+    assert tall.tolist() == pytest.approx([1.0, 0.4, 0.7]) and (shown.scale[:, 0] == shown.scale[:, 1]).all()
 
 
 def test_without_fire_there_is_neither_flame_nor_smoke_nor_glow():

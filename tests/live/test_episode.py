@@ -7,16 +7,19 @@ import time
 
 import numpy as np
 import pytest
+import torch
 
 pytest.importorskip("viser", reason="needs the extra live")
 
 from drawings.episode import _picture
 
+from warp_torchrl.env.pictures.caption import progress
 from warp_torchrl.evaluation.picture import record_episode
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.live.episode import Film, SceneRecorder, map_colours, progress
+from warp_torchrl.live.episode import Film, SceneRecorder, map_colours
 from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.world import World
 
 SEED = 1_000_000
 HOSTILE = "<script>alert('&')</script>"
@@ -132,7 +135,19 @@ def test_the_legend_names_what_is_on_the_map_and_each_vehicle(make_match):
     assert set(names) & covers == there and "bare" not in names
     assert {"fire", "ash", "wet"} <= set(names)
     assert names[-3:] == ["B0  bulldozer_0", "B1  bulldozer_1", "B2  bulldozer_2"]
-    assert re.fullmatch(r"step 0 of 30:  \d+% saved, \d+% burning", progress(side))
+    assert re.fullmatch(r"step 0 of 30:  \d+% saved, \d+% burning", progress(side.state, side.env.world))
+
+
+def test_houses_stand_where_worlds_have_some(make_match, monkeypatch):
+    match = make_match()
+    side = match.sides[0]
+    assert "house" not in map_colours(side) and Film(match.sides, ["small"])._stages[0]._houses._handle is None
+    left = torch.full(side.state.cells.shape, -1.0)
+    left[0, 2, 3] = left[0, 4, 1] = 1.0
+    monkeypatch.setattr(World, "buildings", lambda world, state: left)
+    film = Film(match.sides, ["small"])
+    assert (film._stages[0]._houses._handle.batched_scales[:, 2] > 0.1).sum() == 2
+    assert {"house", "house, lost"} <= set(map_colours(side))
 
 
 def test_nothing_seen_is_no_episode(env, tmp_path):

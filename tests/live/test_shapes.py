@@ -11,6 +11,7 @@ SHAPES = {
     "tree": shapes.tree(),
     "flame": shapes.flame(),
     "puff": shapes.puff(),
+    "house": shapes.house(),
     **{f"bulldozer {part}": shape for part, shape in shapes.bulldozer().items()},
     **{f"drone {part}": shape for part, shape in shapes.drone().items()},
 }

@@ -40,7 +40,7 @@ def record_episode(
         play(env, policy, seed, mode, scene)
         scene.save(path)
         return
-    frames = EpisodeRecorder(title=title, roles=env.world.team.agent_roles)
+    frames = EpisodeRecorder(title, env.world.team.agent_roles, env.world.buildings)
     play(env, policy, seed, mode, frames)
     if kind == "mp4":
         write_video(path, frames.frames())

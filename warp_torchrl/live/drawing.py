@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
-from warp_torchrl.env.pictures.colours import fire_colours
+from warp_torchrl.env.pictures.colours import HOUSE, LOST, fire_colours
 from warp_torchrl.live.ground import SceneGround
 from warp_torchrl.world.arrays.geometry import unit_vectors
 from warp_torchrl.world.state.cells import is_burning, is_tree
@@ -81,6 +81,26 @@ def trees(state: WorldState, ground: SceneGround, cells: Tensor) -> Instances:
         turn=_upright(len(codes)),
         scale=torch.stack((wide, wide, tall), dim=1).numpy(),
         colour=(colour * light).clamp(max=255.0).byte().numpy(),
+    )
+
+
+def houses(left: Tensor, ground: SceneGround) -> Instances:
+    """Return a house for each cell of world 0 where something stands, lower and darker the less is left of it.
+
+    Args:
+        left: Of ``Mechanic.buildings``.
+        ground: Of world 0.
+    """
+    share = left[0].flatten().cpu()
+    index = (share >= 0.0).nonzero()[:, 0]
+    share = share[index, None].float()
+    colour = torch.tensor(LOST).float().lerp(torch.tensor(HOUSE).float(), share)
+    side = torch.full_like(share, max(1.5, max(ground.size) / 36.0))
+    return Instances(
+        position=ground.position[index.numpy()],
+        turn=_upright(len(index)),
+        scale=torch.cat((side, side, side * (0.4 + 0.6 * share)), dim=1).numpy(),
+        colour=colour.round().byte().numpy(),
     )
 
 

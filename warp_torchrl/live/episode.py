@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.env.pictures.caption import progress
 from warp_torchrl.env.pictures.colours import legend_colours
 from warp_torchrl.env.pictures.veil import View, first_view, veil_colours
 from warp_torchrl.live.crew import Crew
@@ -21,7 +22,6 @@ from warp_torchrl.live.words import chips, labels, vehicle_colours
 from warp_torchrl.system import disk
 from warp_torchrl.system.foreign_text import escaped_markdown
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
-from warp_torchrl.world.state.cells import count_trees
 from warp_torchrl.world.state.state import Cover, WorldState
 
 STEP_SECONDS, END_SECONDS = 0.12, 2.0
@@ -61,11 +61,11 @@ class Film:
         """Record the present state of the sides.
 
         Args:
-            titles: Title of each side; by default the step, and the forest saved and burning.
+            titles: Title of each side; by default its ``progress``.
         """
         if self._pictures:
             self._film.insert_sleep(STEP_SECONDS)
-        for stage, title in zip(self._stages, titles or [progress(side) for side in self._sides]):
+        for stage, title in zip(self._stages, titles or [progress(side.state, side.env.world) for side in self._sides]):
             stage.show(title, self.view)
         self._pictures += 1
 
@@ -79,21 +79,15 @@ class Film:
         return _framed(page, self._lines, {**map_colours(self._sides[0]), **veil})
 
 
-def progress(side: Shown) -> str:
-    """Return where an episode is: step, and the forest saved and burning."""
-    counts = count_trees(side.state)
-    burning = float(counts.burning[0] / counts.initial[0])
-    step, horizon = int(side.state.step[0]), side.env.world.horizon
-    return f"step {step} of {horizon}:  {float(counts.saved()[0]):.0%} saved, {burning:.0%} burning"
-
-
 def map_colours(side: Shown) -> dict[str, Sequence[int]]:
-    """Return the colours of what can be seen on a side's map, by name: its covers, fire and what is left, vehicles."""
+    """Return the colours of what can be seen on a side's map, by name: covers, fire, what is left, houses, vehicles."""
     absent = {cover.name.lower() for cover in Cover} - {
         Cover(each).name.lower() for each in side.state.cover.unique().tolist()
     }
     colours: Mapping[str, Sequence[int]] = {
-        name: colour for name, colour in legend_colours().items() if name not in absent
+        name: colour
+        for name, colour in legend_colours(side.env.world.buildings(side.state)).items()
+        if name not in absent
     }
     names = side.env.agent_names
     vehicles = zip(labels(names), vehicle_colours(names).items())

@@ -68,6 +68,16 @@ def tree() -> Mesh:
 
 
 @lru_cache(maxsize=1)
+def house() -> Mesh:
+    """Return a house of height 1 under a gable roof."""
+    x, y, eaves = 0.42, 0.34, 0.55
+    roof = np.array([[-x, -y, eaves], [x, -y, eaves], [x, y, eaves], [-x, y, eaves], [-x, 0.0, 1.0], [x, 0.0, 1.0]])
+    faces = np.array([[0, 1, 5], [0, 5, 4], [2, 3, 4], [2, 4, 5], [1, 2, 5], [3, 0, 4], [0, 3, 2], [0, 2, 1]])
+    walls = box((2.0 * 0.9 * x, 2.0 * 0.8 * y, eaves), (0.0, 0.0, eaves / 2.0))
+    return joined_meshes(walls, Mesh(roof.astype(np.float32), faces.astype(np.uint32)))
+
+
+@lru_cache(maxsize=1)
 def flame() -> Mesh:
     """Return a flame of height 1."""
     return spindle((0.12, 0.34, 0.2, 0.0), (0.0, 0.22, 0.6, 1.0), 5)

@@ -14,7 +14,7 @@ from warp_torchrl.live import drawing
 from warp_torchrl.live.crew import Crew
 from warp_torchrl.live.drawing import Instances
 from warp_torchrl.live.ground import SceneGround, ground_of
-from warp_torchrl.live.shapes import TILE, Mesh, bulldozer, drone, flame, puff, tree
+from warp_torchrl.live.shapes import TILE, Mesh, bulldozer, drone, flame, house, puff, tree
 from warp_torchrl.live.words import labels
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import WorldState
@@ -107,6 +107,7 @@ class Stage:
         self._trees = Flock(server, self._node("trees"), tree())
         self._flames = Flock(server, self._node("flames"), flame())
         self._smoke = Flock(server, self._node("smoke"), puff(), 0.24)
+        self._houses = Flock(server, self._node("houses"), house())
         self._flies = side.env.world.team.table(torch.device("cpu")).flies
         self._add_vehicles()
         self._wind = scene.add_arrows(
@@ -131,6 +132,9 @@ class Stage:
             self._flames.show(drawing.flames(state, ground))
             self._smoke.show(drawing.smoke_puffs(state, ground))
             self._show_sparks(state)
+            buildings = self._side.env.world.buildings(self._side.state)
+            if buildings is not None:
+                self._houses.show(drawing.houses(buildings, ground))
             self._show_vehicles()
             place, strength = drawing.glow(state, ground)
             change(self._glow, position=place, intensity=strength)

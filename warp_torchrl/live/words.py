@@ -164,7 +164,8 @@ def numbers_html(numbers: Mapping[str, float]) -> str:
 def legend(side: Side) -> str:
     """Return the meaning of the colours, and the colour of each vehicle, as HTML."""
     veil = veil_colours() if can_believe(side.env.world) else {}
-    spans = chips({**legend_colours(), **veil, **vehicle_colours(side.env.agent_names)})
+    drawn = legend_colours(side.env.world.buildings(side.state))
+    spans = chips({**drawn, **veil, **vehicle_colours(side.env.agent_names)})
     return f"<div style='{_STYLE};padding:2px 12px'>{spans}</div>"
 
 

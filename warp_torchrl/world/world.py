@@ -158,6 +158,10 @@ class World(Parts):
         burns = is_burning(self.assumed(state).cells).unflatten(0, (len(state.key), -1)).to(torch.float32)
         return burns, torch.zeros_like(burns)
 
+    def buildings(self, state: WorldState) -> Tensor | None:
+        """Return what is left of the buildings in each cell, see ``Mechanic.buildings``; None where there are none."""
+        return self._last(lambda each: each.buildings(state))
+
     def futures(self, state: WorldState, count: int) -> WorldState:
         """Return worlds that may be the true ones, see ``Mechanic.futures``; where nobody knows better, these."""
         rows = torch.arange(len(state.key), device=state.key.device).repeat_interleave(count)

@@ -6,6 +6,7 @@ import torch
 from PIL import Image
 
 from tests.env.pictures.worlds import drawn, small_world
+from warp_torchrl.env.pictures.colours import HOUSE, LOST
 from warp_torchrl.env.pictures.recorder import EpisodeRecorder
 from warp_torchrl.env.pictures.render import render
 from warp_torchrl.world.backends.tick import in_wind
@@ -96,6 +97,20 @@ def test_the_legend_shows_only_the_roles_that_take_part():
     ):
         picture = panel(state, roles=roles)[260:]
         assert tuple((picture == colour).all(-1).any() for colour in (violet, cyan)) == shown
+
+
+@pytest.mark.parametrize("side", [32, 700])
+def test_houses_are_on_the_map_and_in_the_legend_where_there_are_some(side):
+    state = drawn([[5] * side] * side)
+    left = torch.full((1, side, side), -1.0)
+    left[0, 20, 20] = 1.0
+    frames = [
+        np.asarray(EpisodeRecorder("wui", ["ugv"], buildings).frame(state))
+        for buildings in (lambda state: left, lambda state: None)
+    ]
+    shown, without = ((frame == HOUSE).all(-1) for frame in frames)
+    assert shown[12:396, 12:396].any() and not without[12:396, 12:396].any()
+    assert (frames[0][380:, -200:] == LOST).all(-1).any() and not (frames[1][380:, -200:] == LOST).all(-1).any()
 
 
 @pytest.mark.parametrize("wind", [(4.0, 0.0), (-4.0, 0.0), (0.0, 4.0), (0.0, -4.0), (3.0, 3.0)])

@@ -5,7 +5,9 @@ import torch
 
 from tests.env.pictures.worlds import drawn, small_world
 from tests.world.drawing import knowing
+from warp_torchrl.env.pictures.colours import HOUSE, LOST, PAPER
 from warp_torchrl.env.pictures.render import render
+from warp_torchrl.world.arrays.batch import concatenated
 from warp_torchrl.world.state.state import Cover, WorldState
 
 UGV, UAV = torch.tensor([0]), torch.tensor([1])
@@ -29,6 +31,17 @@ def test_a_frame_has_scale_pixels_to_a_cell(size, scale):
     frames = render(state, team.table(state.cells.device).index, scale)
     assert frames.shape == (3, size[0] * scale, size[1] * scale, 3)
     assert frames.dtype == torch.uint8
+
+
+def test_a_house_is_a_square_in_an_outline_light_while_it_stands():
+    left = torch.tensor([[[-1.0, 1.0], [0.4, -1.0]], [[-1.0, -1.0], [-1.0, 0.5]]])
+    state = drawn([[5, 5], [5, 5]])
+    image = render(concatenated([state, state]), None, 4, left)
+    plain = render(state, None, 4)[0]
+    assert torch.equal(image[0, :4, :4], plain[:4, :4]) and torch.equal(image[0, 4:, 4:], plain[4:, 4:])
+    assert (image[0, 1:3, 5:7] == torch.tensor(HOUSE)).all() and (image[0, 5:7, 1:3] == torch.tensor(LOST)).all()
+    assert (image[0, 0, 4:] == torch.tensor(PAPER)).all() and (image[1, 5:7, 5:7] == torch.tensor(HOUSE)).all()
+    assert torch.equal(image[1, :, :4], plain[:, :4])
 
 
 def test_a_batch_is_drawn_as_its_worlds_are():

@@ -19,6 +19,8 @@ ASH, FIREBREAK, WATER = (40, 38, 42), (230, 204, 168), (84, 196, 255)
 AGENT = (((255, 255, 255), (124, 30, 190)), ((16, 18, 24), (90, 236, 255)))  # each role's outline and body
 AGES, FIRE_ROW, ASH_ROW, FIREBREAK_ROW, WET_ROW, FOG_ROW = 11, 55, 60, 61, 62, 124
 """Rows of ``colour_table``: of each cover, and where the other kinds begin."""
+HOUSE, LOST = (240, 241, 243), FIRE[4]
+"""Of buildings that have all of their worth, and none."""
 PAPER, INK, SOFT, LINE = (24, 27, 32), (240, 241, 243), (168, 170, 174), (98, 101, 105)
 """Colours of the panel: ground, text, its captions, lines."""
 
@@ -28,10 +30,11 @@ def fire_colours() -> Tensor:
     return torch.tensor(FIRE, dtype=torch.uint8)
 
 
-def legend_colours() -> dict[str, tuple[int, int, int]]:
-    """Return a colour of each item that is drawn on a map, by its name."""
+def legend_colours(buildings: Tensor | None = None) -> dict[str, tuple[int, int, int]]:
+    """Return a colour of each item that is drawn on a map, by its name; of buildings where there are some."""
     covers = {cover.name.lower(): GROUND[cover][-1] for cover in Cover}
-    return {**covers, "fire": FIRE[2], "ember": FIRE[4], "ash": ASH, "firebreak": FIREBREAK, "wet": WATER}
+    drawn = {**covers, "fire": FIRE[2], "ember": FIRE[4], "ash": ASH, "firebreak": FIREBREAK, "wet": WATER}
+    return drawn if buildings is None else {**drawn, "house": HOUSE, "house, lost": LOST}
 
 
 @kept(8)

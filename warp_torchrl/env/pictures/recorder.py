@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from PIL import Image, ImageDraw, ImageFont
 from torch import Tensor
-from torch.nn.functional import interpolate
+from torch.nn.functional import adaptive_max_pool2d, interpolate
 
 from warp_torchrl.env.pictures.colours import (
     AGENT,
@@ -18,14 +18,16 @@ from warp_torchrl.env.pictures.colours import (
     ASH_ROW,
     FIRE_ROW,
     FIREBREAK_ROW,
+    HOUSE,
     INK,
     LINE,
+    LOST,
     PAPER,
     SOFT,
     WET_ROW,
     colour_table,
 )
-from warp_torchrl.env.pictures.render import ground_colours, render, stamp
+from warp_torchrl.env.pictures.render import ground_colours, render, stamp, with_buildings
 from warp_torchrl.world.state.cells import count_trees
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import Cover, WorldState
@@ -42,10 +44,13 @@ class EpisodeRecorder:
     Args:
         title: Heading of the panel, such as the scenario; what follows a line break stands smaller below it.
         roles: Role of each agent, as ``Team.agent_roles``.
+        buildings: ``World.buildings``; None draws none.
     """
 
-    def __init__(self, title: str, roles: Sequence[str]):
-        self._title = title
+    def __init__(
+        self, title: str, roles: Sequence[str], buildings: Callable[[WorldState], Tensor | None] = lambda state: None
+    ):
+        self._title, self._buildings = title, buildings
         self._flies = torch.tensor([ROLES[role].flies for role in roles])
         self._frames: list[Image.Image] = []
         self._seen, self._stride = 0, 1
@@ -62,8 +67,10 @@ class EpisodeRecorder:
     def frame(self, state: WorldState) -> Image.Image:
         """Return the picture of world 0 of a batch, RGB."""
         state = state[:1]
-        picture = Image.fromarray(_fitted_map(state, self._flies))
-        panel = _legend(self._title, tuple(self._flies.to(torch.int64).unique().tolist())).copy()
+        buildings = self._buildings(state)
+        picture = Image.fromarray(_fitted_map(state, self._flies, buildings))
+        roles = tuple(self._flies.to(torch.int64).unique().tolist())
+        panel = _legend(self._title, roles, buildings is not None).copy()
         _draw_numbers(panel, state)
         _draw_wind(panel, *state.wind.mean((0, 2, 3)).tolist())
         height = max(panel.height, picture.height)
@@ -97,16 +104,19 @@ class EpisodeRecorder:
             partial.unlink(missing_ok=True)
 
 
-def _fitted_map(state: WorldState, flies: Tensor) -> np.ndarray:
+def _fitted_map(state: WorldState, flies: Tensor, buildings: Tensor | None) -> np.ndarray:
     """Return the map of one world with its longer side near 384 pixels, uint8 [h, w, 3]; a large one is averaged."""
     flies, (height, width) = flies.to(state.cells.device), state.cells.shape[1:]
     shrink = max(height, width) / _MAP_SIDE
     if shrink <= 1.5:
-        return render(state, flies, max(1, round(1 / shrink)))[0].cpu().numpy()
+        return render(state, flies, max(1, round(1 / shrink)), buildings)[0].cpu().numpy()
     colours = ground_colours(state).movedim(3, 1).float()
-    image = interpolate(colours, (math.ceil(height / shrink), math.ceil(width / shrink)), mode="area").round()
+    size = math.ceil(height / shrink), math.ceil(width / shrink)
+    image = interpolate(colours, size, mode="area").round().byte().movedim(1, 3)
+    if buildings is not None:
+        image = with_buildings(image, adaptive_max_pool2d(buildings, size), 1)
     place = (state.vehicles.position / shrink).long()
-    return stamp(image.byte().movedim(1, 3), place, flies.long(), 1, on_scene(state))[0].cpu().numpy()
+    return stamp(image, place, flies.long(), 1, on_scene(state))[0].cpu().numpy()
 
 
 @lru_cache(maxsize=1)
@@ -129,8 +139,9 @@ def _write(panel: Image.Image, place: tuple[int, int], text: str, size: int, col
 
 
 @lru_cache(maxsize=8)
-def _legend(title: str, roles: tuple[int, ...]) -> Image.Image:
+def _legend(title: str, roles: tuple[int, ...], has_buildings: bool) -> Image.Image:
     """Return the constant part of the panel: title and legend."""
+    top = 246 if has_buildings else 262
     panel = Image.new("RGB", _PANEL, PAPER)
     for line, y, size, colour in zip(title.splitlines(), (9, 36), (22, 15), (INK, SOFT)):
         _write(panel, (0, y), line, size, colour)
@@ -140,11 +151,12 @@ def _legend(title: str, roles: tuple[int, ...]) -> Image.Image:
     left = {cover.name.capitalize(): trees[cover, 1:] for cover in list(Cover)[: Cover.BARE]}
     left |= {"No tree": trees[1:, 0], "Wet": table[WET_ROW + AGES : WET_ROW + 4 * AGES : 8]}
     right = {"Fire": fire, "Ember": ember, "Ash": ash, "Firebreak": firebreak}
+    left |= {"House": np.array([HOUSE, LOST], dtype=np.uint8)} if has_buildings else {}
     for x, entries in ((0, left), (_COLUMN, right)):
-        for y, (name, colours) in zip(range(262, 400, 20), entries.items()):
+        for y, (name, colours) in zip(range(top, 400, 20), entries.items()):
             _paste_strip(panel, colours, x, y, 30, 15)
             _write(panel, (x + 38, y + 7), name, 13, INK)
-    for y, role in zip((342, 362), roles):
+    for y, role in zip((top + 80, top + 100), roles):
         ground = torch.tensor(PAPER, dtype=torch.uint8).expand(1, 15, 31, 3)
         glyph = stamp(ground, torch.tensor([[[7, 15]]]), torch.tensor([role]))[0].numpy()
         panel.paste(Image.fromarray(glyph), (_COLUMN, y))

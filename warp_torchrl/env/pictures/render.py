@@ -10,7 +10,10 @@ from warp_torchrl.env.pictures.colours import (
     FIRE_ROW,
     FIREBREAK_ROW,
     FOG_ROW,
+    HOUSE,
     INK,
+    LOST,
+    PAPER,
     WET_ROW,
     colour_table,
 )
@@ -22,13 +25,14 @@ from warp_torchrl.world.team.presence import on_scene
 _LATELY = 0.5  # freshness of what was seen 16 steps ago, from which a cell is in fog
 
 
-def render(state: WorldState, flies: Tensor | None, scale: int = 12) -> Tensor:
+def render(state: WorldState, flies: Tensor | None, scale: int = 12, buildings: Tensor | None = None) -> Tensor:
     """Draw each world.
 
     Args:
         state: The worlds, batch size [B].
         flies: Which agents are aircraft, bool [A]; None leaves the agents out.
         scale: Side of a cell [pixels].
+        buildings: Of ``World.buildings``; None draws none.
 
     Returns:
         uint8 [B, H * scale, W * scale, 3], on the state's device.
@@ -38,12 +42,15 @@ def render(state: WorldState, flies: Tensor | None, scale: int = 12) -> Tensor:
     """
     if scale < 1:
         raise ValueError(f"scale must be at least 1 pixel, got {scale}")
-    return painted(ground_colours(state), state, flies, scale)
+    return painted(ground_colours(state), state, flies, scale, buildings)
 
 
-def painted(colours: Tensor, state: WorldState, flies: Tensor | None, scale: int) -> Tensor:
+def painted(
+    colours: Tensor, state: WorldState, flies: Tensor | None, scale: int, buildings: Tensor | None = None
+) -> Tensor:
     """Return ``render`` of worlds whose cells have other colours, uint8 [B, H, W, 3]."""
     image = colours.repeat_interleave(scale, dim=1).repeat_interleave(scale, dim=2)
+    image = image if buildings is None else with_buildings(image, buildings, scale)
     owner = state.plane("agencies", "owner")
     if owner is not None:
         image = _with_borders(image, owner.repeat_interleave(scale, dim=1).repeat_interleave(scale, dim=2))
@@ -87,6 +94,24 @@ def stamp(image: Tensor, centre: Tensor, roles: Tensor, scale: int = 1, there: T
     top = top[:, radius:-radius, radius:-radius]
     paint = torch.tensor(AGENT, dtype=torch.uint8, device=device)[top // (3 * agents), (top % 3 - 1).clamp(min=0)]
     return torch.where((top > 0)[..., None], paint, image)
+
+
+def with_buildings(image: Tensor, left: Tensor, scale: int) -> Tensor:
+    """Return images, uint8 [B, h, w, 3], with a square in each cell where something stands, in an outline.
+
+    Args:
+        image: The images.
+        left: Of ``Mechanic.buildings``, float32 [B, H, W].
+        scale: Side of a cell [pixels].
+    """
+    tones = torch.tensor((PAPER, HOUSE, LOST), dtype=torch.uint8, device=image.device)
+    inside = torch.arange(scale, device=image.device)
+    inside = (inside >= scale // 4) & (inside < scale - scale // 4)
+    body = inside[:, None] & inside
+    part = torch.where(left >= 0.5, 1, 2)[..., None, None] * body  # 0 is the outline
+    shown = (left >= 0.0)[..., None, None].expand_as(part)
+    part, shown = (each.transpose(2, 3).flatten(3, 4).flatten(1, 2) for each in (part, shown))
+    return torch.where(shown[..., None], tones[part], image)
 
 
 def _with_borders(image: Tensor, owner: Tensor) -> Tensor:

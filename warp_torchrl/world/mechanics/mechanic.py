@@ -248,6 +248,17 @@ class Mechanic:
         """
         return None
 
+    def buildings(self, state: WorldState) -> Tensor | None:
+        """Return the share that is left of what stands in each cell, float32 [B, H, W]; -1 where nothing stands.
+
+        Pictures show it. None where the mechanic knows of no buildings; the last one that answers is heard.
+        """
+        return None
+
+    def caption(self, state: WorldState) -> tuple[str, ...]:
+        """Return what pictures of world 0 say of it in words."""
+        return ()
+
     def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
         """Return the rows of its metrics."""
         return ()

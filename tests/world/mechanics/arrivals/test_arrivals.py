@@ -219,6 +219,15 @@ def test_aircraft_that_are_not_there_use_no_charge_and_are_nobody_s_near_miss():
     assert seen == [([8, 9], [0, 0]), ([7, 8], [1, 1])]
 
 
+def test_pictures_say_how_many_are_there():
+    world = small_world(mechanics=(LATE,), fire=Fire(youngest_fuel=1), wind=Calm(), steps_per_tick=1)
+    state, said = at_start(world, (0, 0), (0, 1), drawing="TTTTTTTTTTTTTa"), []
+    for _ in range(3):
+        said += LATE.caption(state)
+        state = world.step(state, torch.full((1, 2), STAY)).after
+    assert said == ["1 of 2 vehicles there"] * 2 + ["2 of 2 vehicles there"]
+
+
 @needs("values")
 def test_only_who_is_there_costs():
     values = pytest.importorskip("warp_torchrl.world.mechanics.values.values").Values()

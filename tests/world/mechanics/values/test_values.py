@@ -62,6 +62,17 @@ def test_a_raster_and_trees_are_worth_something_too():
     assert played(Values(), 6, "aTT.T", assets=[[0.0, 0, 2, 0, 1]])[1]["worth_saved"] == pytest.approx(1 - 2 / 3 * 0.85)
 
 
+def test_pictures_show_what_is_left_of_each_asset_and_say_it():
+    values = Values(points=((0, 1, 3.0), (0, 4, 1.0)), escape_area=0.1)
+    state, _ = played(values, 3, "aT.TT")
+    assert values.buildings(state)[0, 0].tolist() == pytest.approx([-1.0, 0.15, -1.0, -1.0, 1.0])
+    # (3 x 0.15 + 1) of 4, and two cells of 30 m.
+    assert values.caption(state) == ("36% of worth left", "fire 0.2 ha, escaped")
+    assert Values().buildings(played(Values(), 3, "aT.TT")[0]) is None, "each tree is worth the same"
+    raster, _ = played(Values(), 3, "aT.TT", assets=[[0.0, 0, 0, 2, 0]])
+    assert Values().buildings(raster)[0, 0].tolist() == [-1.0, -1.0, -1.0, 1.0, -1.0]
+
+
 @pytest.mark.parametrize(("reach", "left"), [(30.0, 0.15), (29.0, 1.0)])
 def test_a_house_on_bare_ground_is_exposed_to_flames_near_it(reach, left):
     ground = "ggbgg"

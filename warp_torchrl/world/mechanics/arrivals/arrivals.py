@@ -153,6 +153,11 @@ class Arrivals(Mechanic):
         """Return ``on_scene`` and ``first_arrival``."""
         return (Metric("on_scene", title="on scene"), Metric("first_arrival", "less", "min", title="first arrival"))
 
+    def caption(self, state: WorldState) -> tuple[str, ...]:
+        """Return how many vehicles are there."""
+        present = state.planes(self.name, Presence).present[0]
+        return (f"{int(present.sum())} of {len(present)} vehicles there",)
+
     def metrics(self, state: WorldState) -> dict[str, Tensor]:
         """Return ``on_scene``, the share of the agents' steps on the scene, and ``first_arrival`` [min].
 

@@ -15,6 +15,11 @@ Points = tuple[tuple[float, float, float], ...]
 """(row, column, worth) of each asset."""
 
 
+def has_assets(state: WorldState, points: Points, houses: int) -> bool:
+    """Return whether the worlds have assets; without any each tree is worth 1."""
+    return bool(points or houses or state.landscape.layer("assets") is not None)
+
+
 def worth_of_assets(state: WorldState, points: Points, houses: int, downwind: Downwind | None = None) -> Tensor:
     """Return what each cell is worth before the fire, float32 [B, H, W].
 
@@ -26,9 +31,9 @@ def worth_of_assets(state: WorldState, points: Points, houses: int, downwind: Do
         houses: How many are drawn over the dry ground, each worth 1.
         downwind: How far down the wind from the fire these stand; None: anywhere.
     """
-    assets = state.landscape.layer("assets")
-    if assets is None and not points and not houses:
+    if not has_assets(state, points, houses):
         return state.initial.to(torch.float32)
+    assets = state.landscape.layer("assets")
     worth = torch.zeros_like(state.alpha) if assets is None else assets.clamp(min=0.0)
     worth = worth + _of_points(state, points) if points else worth
     return worth + _of_houses(state, houses, downwind) if houses else worth

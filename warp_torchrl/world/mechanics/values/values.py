@@ -21,7 +21,7 @@ from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.mechanics.mechanic import Mechanic, Metric, Rules
 from warp_torchrl.world.mechanics.minutes import check_minutes, minutes_of_tick
 from warp_torchrl.world.mechanics.table import mechanic
-from warp_torchrl.world.mechanics.values.assets import worth_of_assets
+from warp_torchrl.world.mechanics.values.assets import has_assets, worth_of_assets
 from warp_torchrl.world.mechanics.values.response import HOMES, RATES, longest_about, lost
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.role import ROLES
@@ -193,9 +193,27 @@ class Values(Mechanic):
             "cost": exposure.cost.clone(),
         }
 
+    def buildings(self, state: WorldState) -> Tensor | None:
+        """See ``Mechanic``: the assets. None where every tree is worth the same."""
+        if not has_assets(state, self.points, self.houses):
+            return None
+        exposure = state.planes(self.name, Exposure)
+        return torch.where(exposure.worth > 0.0, self._kept(exposure), -1.0)
+
+    def caption(self, state: WorldState) -> tuple[str, ...]:
+        """Return the worth that is left, the area of the fire, and what became of it."""
+        now = {name: float(each[0]) for name, each in self.metrics(state[:1]).items()}
+        size = f"fire {now['fire_size']:.{0 if now['fire_size'] >= 10.0 else 1}f} ha"
+        end = "escaped" if now["escaped"] else "contained" if now["contained"] else ""
+        return f"{now['worth_saved']:.0%} of worth left", f"{size}, {end}" if end else size
+
+    def _kept(self, exposure: Exposure) -> Tensor:
+        """Return the share of its worth that flames and embers have left of each asset, float32 [B, H, W]."""
+        return (1.0 - lost(exposure.flames, self.losses)) * exposure.spared
+
     def _left(self, exposure: Exposure) -> Tensor:
         """Return the share of the worth that flames and embers have left, float32 [B]; 1 where there was none."""
-        kept = (1.0 - lost(exposure.flames, self.losses)) * exposure.spared
+        kept = self._kept(exposure)
         total, left = (each.flatten(1).sum(dim=1) for each in (exposure.worth, exposure.worth * kept))
         return torch.where(total > 0.0, left / total.clamp(min=1e-30), 1.0)
 
