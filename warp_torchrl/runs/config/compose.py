@@ -255,9 +255,15 @@ def _targets(group: str) -> Iterator[tuple[str, str]]:
     """Yield the options of a group, each with the path of its class: the package's first."""
     for folder in (conf_folder(), *conf_folders()):
         for path in sorted((folder / group).glob("*.yaml")):
-            yield path.stem, cast("DictConfig", OmegaConf.load(path)).get("_target_", "")
+            yield path.stem, _target_in(path, path.stat().st_mtime_ns)
         if folder == conf_folder():
             yield from registered(group).items()
+
+
+@lru_cache(maxsize=1024)
+def _target_in(path: Path, changed: int) -> str:
+    """Return the path of the class that a yaml file names, once for each state of the file; empty where it has none."""
+    return cast("DictConfig", OmegaConf.load(path)).get("_target_", "")
 
 
 def option_of(group: str, target: str) -> str:
