@@ -11,6 +11,7 @@ from warp_torchrl.world.backends import spells as spells_module
 from warp_torchrl.world.backends.spells import Highest, strips
 from warp_torchrl.world.backends.spreading import Spreading
 from warp_torchrl.world.fires import alone
+from warp_torchrl.world.fires import parts as parts_module
 from warp_torchrl.world.fires.alone import Fires
 from warp_torchrl.world.fires.on_map import arrival_minutes, on_map
 from warp_torchrl.world.fires.spell import Spell
@@ -138,7 +139,7 @@ def test_fires_that_stop_at_an_area_have_burned_what_they_would_have_by_then():
 def test_too_many_fires_for_their_window_go_on_in_parts(monkeypatch):
     (fires, cells), key = started(8, weather=3), world_key(torch.arange(3))
     whole = torch.cat(list(arrival_minutes(fires.fire, fires.landscape, cells, key, fires.spells, 30.0)))
-    monkeypatch.setattr(alone, "_MOST_CELLS", 2 * 19 * 64)
+    monkeypatch.setattr(parts_module, "_MOST_CELLS", 2 * 19 * 64)
     parts = list(fires.in_parts(cells, key, lambda burned: (burned.window, on_map(burned))))
     assert len(parts) == 3 and torch.equal(torch.cat([minutes for _, minutes in parts]), whole)
 
