@@ -19,12 +19,13 @@ MAPS = {"burn_probability.tif", "arrival_hours.tif", "rate.tif", "intensity.tif"
 
 @pytest.fixture(autouse=True)
 def no_figure(monkeypatch):
-    """Figures take longer than all else."""
+    """Figures and films take longer than all else."""
 
     def missing(*_):
         raise ImportError("not here")
 
     monkeypatch.setattr(command, "write_figure", missing)
+    monkeypatch.setattr(command, "write_animation", lambda path, *_: path.touch())
 
 
 def names(out):

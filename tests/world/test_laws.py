@@ -93,7 +93,7 @@ def diagonal_over_axis(fire: Fire, ticks: int, seed: int = 0) -> float:
     return axis / diagonal
 
 
-@pytest.mark.parametrize(("alpha", "paper_ticks"), [(0.33, 40), (0.8, 20)])
+@pytest.mark.parametrize(("alpha", "paper_ticks"), [pytest.param(0.33, 40, marks=SLOW), (0.8, 20)])
 def test_under_law_hazard_a_calm_fire_is_round(alpha: float, paper_ticks: int) -> None:
     # Diagonal over axis in [0.95, 1.06]: 1.014 +- 0.008 for alpha 0.33 and 1.001 +- 0.010 for 0.8, so the bounds lie
     # four deviations away or more; false alarm under 1e-4.
@@ -128,7 +128,14 @@ FIRES = {
 }
 
 
-@pytest.mark.parametrize("name", FIRES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        "paper, alexandridis",
+        "hazard, ellipse",
+        *(pytest.param(name, marks=SLOW) for name in ("paper, ellipse", "hazard, alexandridis")),
+    ],
+)
 def test_a_head_does_not_slow_down_when_the_wind_rises(name: str) -> None:
     # At 0, 5 and 10 m/s, in cells a tick: paper 0.54, 0.56, 0.60 and, with the ellipse, 0.54, 0.73, 1.00; hazard 0.226,
     # 0.236, 0.248 and 0.226, 0.277, 0.585; all +- 0.005 to 0.011. The smallest step is 1.3 deviations of a difference.
@@ -168,9 +175,15 @@ def length_over_breadth(metres_a_second: float, diagonal: bool, seed: int = 0, k
 
 
 @pytest.mark.parametrize(
-    "metres_a_second", [0.0, pytest.param(2.5, marks=SLOW), 5.0, pytest.param(7.5, marks=SLOW), 10.0]
+    ("metres_a_second", "diagonal"),
+    [
+        (0.0, False),
+        (5.0, True),
+        (10.0, False),
+        *(pytest.param(*each, marks=SLOW) for each in ((0.0, True), (5.0, False), (10.0, True))),
+        *(pytest.param(speed, diagonal, marks=SLOW) for speed in (2.5, 7.5) for diagonal in (False, True)),
+    ],
 )
-@pytest.mark.parametrize("diagonal", [False, True])
 def test_ellipses_have_the_canadian_length_to_breadth(metres_a_second: float, diagonal: bool) -> None:
     # Calm hazard 0.05 a tick, 30 spreading ticks: within 20 % of the curve along the axes, 30 % at 45 degrees. Over
     # six seeds the ratio is 1.00, 0.86, 0.84, 0.91, 0.92 along an axis at 0, 2.5, 5, 7.5, 10 m/s, and 1.00, 0.94,
@@ -184,6 +197,7 @@ def test_ellipses_have_the_canadian_length_to_breadth(metres_a_second: float, di
 
 # Burned area, by the wind.
 
+HAZARDS = [(24, 150, 1.2), (12, 75, 1.1), (8, 60, 1.02)]  # a refinement, ticks and a factor
 BEARINGS = [0.0, 22.5, 45.0]
 
 
@@ -198,8 +212,14 @@ def burned_by(fire: Fire | RateFire, metres_a_second: float, bearing: float, tic
     return burned.sum(dim=(1, 2)).float().mean().item()
 
 
-@pytest.mark.parametrize("bearing", BEARINGS)
-@pytest.mark.parametrize(("refinement", "ticks", "factor"), [(24, 150, 1.2), (12, 75, 1.1), (8, 60, 1.02)])
+@pytest.mark.parametrize(
+    ("refinement", "ticks", "factor", "bearing"),
+    [
+        pytest.param(*hazard, bearing, marks=[] if near == far else [SLOW])
+        for near, hazard in enumerate(HAZARDS)
+        for far, bearing in enumerate(BEARINGS)
+    ],
+)
 def test_under_law_hazard_more_wind_burns_more(refinement: int, ticks: int, factor: float, bearing: float) -> None:
     # In coarser ticks heads of 8 m/s and more are near a cell a tick, which no fire passes.
     fire = HazardFire(refinement=refinement)

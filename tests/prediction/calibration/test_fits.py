@@ -42,22 +42,14 @@ def test_known_parameters_are_found_again(method):
 def test_a_strong_prior_keeps_the_law_as_it_was():
     start = fire()
     parameters = parameters_of(NAMES, start)
-    z = Gradients(prior_weight=100.0, steps=2)(start, parameters, cases_of(TRUTH)[1:])
+    z = Gradients(prior_weight=100.0, steps=1)(start, parameters, cases_of(TRUTH)[1:])
     assert z.abs().max() < 0.05
 
 
-def test_the_prior_adds_its_weight_times_half_of_z_squared():
-    # z = (1, -2): half of 1 + 4 is 2.5; its slope is z, its curvature 1 for each parameter.
+def test_the_prior_of_evolution_adds_its_weight_times_half_of_z_squared():
+    # z = (1, -2): half of 1 + 4 is 2.5.
     start = fire()
     parameters, z, case = parameters_of(NAMES, start), torch.tensor([1.0, -2.0]), case_of(TRUTH, side=21)
-    free, bound = (Gradients(prior_weight=weight, steps=1) for weight in (0.0, 0.4))
-    (loss, slope, curvature), found = (
-        free.slope(start, parameters, z, [case]),
-        bound.slope(start, parameters, z, [case]),
-    )
-    assert found[0] - loss == pytest.approx(0.4 * 2.5, abs=1e-5)
-    assert torch.allclose(found[1] - slope, 0.4 * z, atol=1e-5)
-    assert torch.allclose(found[2] - curvature, 0.4 * torch.eye(2), atol=1e-4)
     candidates = torch.stack((torch.zeros(2), z))
     free, bound = (Evolution(prior_weight=weight) for weight in (0.0, 0.4))
     more = bound.losses(start, parameters, candidates, [case]) - free.losses(start, parameters, candidates, [case])
@@ -77,7 +69,7 @@ def test_in_weather_that_stays_the_margin_is_the_logarithm_of_the_time():
 
 def test_the_gradient_is_that_of_finite_differences():
     start = fire()
-    case, parameters, step = case_of(TRUTH, side=25), parameters_of(NAMES, start), 0.2
+    case, parameters, move = case_of(TRUTH, side=25), parameters_of(NAMES, start), torch.tensor([0.2, -0.1])
     at = margin(start, parameters, torch.zeros(2), case)
 
     def burned(z):
@@ -85,9 +77,8 @@ def test_the_gradient_is_that_of_finite_differences():
 
     density = torch.exp(-0.5 * (at.log_factor / 0.2).square()) / (0.2 * (2 * torch.pi) ** 0.5)
     told = -(density * at.gradient).sum((1, 2, 3))
-    moves = torch.eye(2) * step
-    differences = torch.stack([(burned(move) - burned(-move)) / (2 * step) for move in moves])
-    assert torch.allclose(told, differences, rtol=0.25, atol=0.05 * float(differences.abs().max())), "rungs are apart"
+    difference = (burned(move) - burned(-move)) / 2
+    assert torch.allclose(move @ told, difference, rtol=0.1), f"rungs are apart: {told}"
 
 
 def test_times_go_down_by_their_share_where_all_rates_go_up():

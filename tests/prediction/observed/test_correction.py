@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from warp_torchrl.benchmark.twins import HiddenFire, perimeters, scene, twin_experiments
+from warp_torchrl.prediction.observed import posterior
 from warp_torchrl.prediction.observed.correction import FORECASTS, Correction
 from warp_torchrl.prediction.observed.observation import Observation
 from warp_torchrl.world.arrays.random import world_key
@@ -30,9 +31,16 @@ def corrected(rate, turn, number, *, times=TIMES, deviations=UNKNOWN, members=64
     return Correction(members=members, deviations=deviations, seed=1000 * number)(fire, seen)
 
 
+@pytest.fixture(autouse=True, scope="module")
+def few_particles():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(posterior, "PARTICLES", 2**13)
+        yield
+
+
 @pytest.fixture(scope="module")
 def learned():
-    return corrected(1.7, 30.0, 0)
+    return corrected(1.7, 30.0, 0, members=32)
 
 
 def test_after_three_observations_the_rate_is_known_and_the_forecast_is_better(learned):

@@ -1,5 +1,7 @@
 """The band computes the reference's bits."""
 
+from itertools import product
+
 import pytest
 import torch
 
@@ -10,15 +12,24 @@ from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.world import World
 
+SLOW = pytest.mark.slow
 AUTOMATA = {
     "usual": RateFire(model="fbp", cell_deviation=0.3, fire_deviation=0.2),
     "growing": RateFire(model="fbp", growth=True, beta=9.0, p_regrow=0.2, residence=5.0, wet_minutes=9.0),
 }
 
 
-@pytest.mark.parametrize("wind", [Uniform(speed=6.0), Wandering(speed=6.0)], ids=["steady", "wandering"])
-@pytest.mark.parametrize("relief", [0.0, 200.0])
-@pytest.mark.parametrize("name", AUTOMATA)
+WINDS = {"steady": Uniform(speed=6.0), "wandering": Wandering(speed=6.0)}
+QUICK = {("usual", 0.0, "steady"), ("usual", 200.0, "wandering"), ("growing", 0.0, "wandering")}
+
+
+@pytest.mark.parametrize(
+    ("name", "relief", "wind"),
+    [
+        pytest.param(*case[:2], WINDS[case[2]], id="-".join(map(str, case)), marks=[] if case in QUICK else SLOW)
+        for case in product(AUTOMATA, (0.0, 200.0), WINDS)
+    ],
+)
 def test_the_band_comes_to_the_bits_of_the_reference(name: str, relief: float, wind: Uniform | Wandering) -> None:
     world = World(fire=AUTOMATA[name], wind=wind, landscape=Perlin(size=24, relief=relief), steps_per_tick=1)
     state = world.reset(torch.arange(5), torch.zeros(5, dtype=torch.int64))

@@ -8,9 +8,10 @@ from tests.world.backends.test_growing import land, lit, on_whole_map, turning
 from warp_torchrl.world.air.fields import Lattice, WeatherFields
 from warp_torchrl.world.air.sunlight import Sunlight
 from warp_torchrl.world.arrays.random import world_key
-from warp_torchrl.world.fires import alone, fastest
+from warp_torchrl.world.fires import fastest
 from warp_torchrl.world.fires.alone import Fires
 from warp_torchrl.world.fires.fastest import RowsOfMap
+from warp_torchrl.world.fires.on_map import on_map
 from warp_torchrl.world.fires.spell import Spell, spread_in
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state import window
@@ -68,4 +69,4 @@ def test_fires_of_large_maps_come_to_the_times_of_the_whole_map_to_the_bit(monke
     burning.landscape.layer("fuel")[0][cells] = 2
     found = burning.burn(cells, key)
     whole = on_whole_map(burning.fire, burning.landscape, cells, key, burning.spells)
-    assert found.window.cells < 90 * 200 and torch.equal(alone.on_map(found), whole)
+    assert found.window.cells < 90 * 200 and torch.equal(on_map(found), whole)

@@ -62,18 +62,17 @@ def test_drawn_members_have_the_deviations_asked_for():
     assert float(found.local.log().std()) == pytest.approx(0.27, abs=0.02), "0.29, of draws within two deviations"
 
 
-@pytest.mark.parametrize("at_once", [64, 2], ids=["together", "in parts"])
-def test_members_burn_as_each_does_alone(at_once, monkeypatch):
+def test_members_burn_as_each_does_alone_together_and_in_parts(monkeypatch):
     size, fire = (41, 64), RateFire(model="fbp", cell_deviation=0.2)
     ground, cells, key = land(1, size), lit(size, (20, 30)), world_key(torch.arange(4))
     members = Members(torch.tensor([member(), member(0.7), member(1.5, 1.3, 40.0), member(1.0, 0.6, -30.0, 1.4)]))
     fires = members.fires(fire, ground, turning(2, minutes=8.0), 30.0)
-    monkeypatch.setattr(alone, "AT_ONCE", at_once)
-    together = torch.cat(list(fires.in_parts(cells, key, on_map)))
-    for one in range(4):
-        single = on_map(fires.of(slice(one, one + 1)).burn(cells, key[one : one + 1]))[0]
-        assert torch.allclose(together[one], single, rtol=1e-4, atol=1e-3)
-    areas = (together < NEVER / 2).flatten(1).sum(1)
+    single = torch.cat([on_map(fires.of(slice(one, one + 1)).burn(cells, key[one : one + 1])) for one in range(4)])
+    for at_once, parts in ((64, 1), (2, 2)):
+        monkeypatch.setattr(alone, "AT_ONCE", at_once)
+        found = list(fires.in_parts(cells, key, on_map))
+        assert len(found) == parts and torch.allclose(torch.cat(found), single, rtol=1e-4, atol=1e-3)
+    areas = (single < NEVER / 2).flatten(1).sum(1)
     assert areas[1] < areas[0] < areas[2]
 
 

@@ -135,7 +135,10 @@ def test_a_further_role_has_a_channel_of_its_own_in_the_state() -> None:
     check_env_specs(env)
 
 
-@pytest.mark.parametrize("name", policy_names())
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[] if name in ("default", "single") else [pytest.mark.slow]) for name in policy_names()],
+)
 def test_a_shipped_policy_plays_beside_roles_and_actions_that_it_does_not_know(name: str) -> None:
     policy = load_policy(name, mode="deterministic")
     crew = "team.roles=[ugv,sprinkler,ugv]"
@@ -176,7 +179,7 @@ def test_a_shipped_policy_plays_beside_them_on_numpy_too() -> None:
 @pytest.mark.parametrize("name", HEURISTICS)
 def test_heuristics_play_beside_them(name: str, allow_stay: bool) -> None:
     env = WildfireEnv(small_world(team=team(3, allow_stay=allow_stay)), n_worlds=3)
-    action = env.rollout(12, HEURISTICS[name](env), break_when_any_done=False)[ACTION]
+    action = env.rollout(4, HEURISTICS[name](env), break_when_any_done=False)[ACTION]
     assert name == "random" or (action < 11).all()
     if name == "noop":
         assert (env.world_state.vehicles.acts == 0).all() or not allow_stay

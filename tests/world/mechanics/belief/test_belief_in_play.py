@@ -16,13 +16,34 @@ from warp_torchrl.world.world import World
 
 UNKNOWN = Ensemble(members=4, hidden=8, rate_deviation=0.4, wind_speed_deviation=0.3, bearing_deviation=20.0)
 AT = (5, 0), (5, 1)
-BELIEFS = (None, Belief(), UNKNOWN, Ensemble(of="agent", members=2, hidden=4))
+BELIEFS = {
+    "none, apart": None,
+    "none": Belief(),
+    "team": UNKNOWN,
+    "agent": Ensemble(of="agent", members=2, hidden=4),
+}
 OF_FIRE = (
     *("cells", "age", "stage_age", "extinguished", "burned", "firebreak", "wet"),
     *("extras.rate.minutes", "extras.rate.origin"),
 )
 """What of a state tells of the fire."""
 METRIC = ("overlap", "union", "skill", "skills", "alight")
+
+
+def alternately(beliefs, options):
+    """Each belief under each law with each of two options; slow with one, in turns."""
+    return [
+        pytest.param(
+            beliefs[belief],
+            law,
+            options[option],
+            id=f"{belief}-{law}-{option}",
+            marks=[pytest.mark.slow] if (b + n + o) % 2 else [],
+        )
+        for b, belief in enumerate(beliefs)
+        for n, law in enumerate(LAWS)
+        for o, option in enumerate(options)
+    ]
 
 
 class Rules(NamedTuple):
@@ -42,9 +63,7 @@ def believed(state):
     return {name: leaf for name, leaf in leaves if name.startswith("extras.belief") and name[14:] not in METRIC}
 
 
-@pytest.mark.parametrize("knows", [True, False], ids=["known fire", "none"])
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("belief", BELIEFS, ids=["none, apart", "none", "team", "agent"])
+@pytest.mark.parametrize(("belief", "law", "knows"), alternately(BELIEFS, {"known fire": True, "none": False}))
 def test_what_nobody_saw_changes_nothing(law, belief, knows):
     world = rules(law, belief=belief or Belief(), shares=belief is not None and getattr(belief, "of", "team") == "team")
     state = begun(world, reset(world), *AT, drop=True)
@@ -69,16 +88,20 @@ def played(world, state, steps):
     return state
 
 
-@pytest.mark.parametrize("sight", [{}, {"miss": 0.2, "false_alarm": 0.05}], ids=["exact", "errors"])
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("belief", [UNKNOWN, Ensemble(of="agent", members=3, hidden=5)], ids=["team", "agent"])
+@pytest.mark.parametrize(
+    ("belief", "law", "sight"),
+    alternately(
+        {"team": UNKNOWN, "agent": Ensemble(of="agent", members=3, hidden=5)},
+        {"exact": {}, "errors": {"miss": 0.2, "false_alarm": 0.05}},
+    ),
+)
 def test_a_batch_of_worlds_is_what_each_is_alone(law, belief, sight):
     world = rules(law, radius=2, sight=sight, belief=belief, shares=belief.of == "team")
     fires = ((5, 3),)
     state = begun(world, alight(world, reset(world, 3), *fires), *AT)
-    together = played(world, state, 6)
-    for one in range(3):
-        alone, among = played(world, state[one : one + 1], 6), together[one : one + 1]
+    together = played(world, state, 4)
+    for one in (0, 2):
+        alone, among = played(world, state[one : one + 1], 4), together[one : one + 1]
         assert law == "rate" or not differing(alone, among)
         for name, leaf in believed(among).items():  # rates of spread of one world are rounded otherwise
             torch.testing.assert_close(leaf, believed(alone)[name], rtol=1e-3, atol=1e-4)

@@ -50,16 +50,16 @@ def test_an_older_policy_plays_on_beside_a_battery():
 
 @pytest.mark.parametrize("name", ["oldest", "lawnmower", "follower"])
 def test_aircraft_turn_back_before_their_batteries_are_empty(name):
-    overrides = ["team.roles=[scout]", "team.n_agents=3", "landscape.size=32", "mechanics.flight.battery=24"]
+    overrides = ["team.roles=[scout]", "team.n_agents=3", "landscape.size=24", "mechanics.flight.battery=16"]
     env = make_env("default", n_worlds=4, overrides=[*overrides, "steps_per_tick=12", "ignition.region=1.0"])
-    policy, now, lowest, charged = HEURISTICS[name](env), env.reset(), 24, False
-    for _ in range(80):
+    policy, now, lowest, charged = HEURISTICS[name](env), env.reset(), 16, False
+    for _ in range(40):
         before = env.world_state.plane("flight", "battery")
         now = env.step(policy(now))["next"]
         battery = env.world_state.plane("flight", "battery")
         lowest = min(lowest, int(battery.min()))
-        charged |= bool(((battery == 24) & (before < 10)).any())
-    assert 0 < lowest < 24 and charged
+        charged |= bool(((battery == 16) & (before < 8)).any())
+    assert 0 < lowest < 16 and charged
 
 
 @pytest.mark.parametrize(

@@ -127,7 +127,7 @@ def test_the_nearest_team_mate_is_the_first_of_those_as_near():
 SMALL = ["landscape.size=16", "team.n_agents=3", "team.tank=4", "horizon=120"]
 
 
-def played(n_worlds, seed, steps=60):
+def played(n_worlds, seed, steps=40):
     env = make_env("haksar", n_worlds=n_worlds, seed=seed, overrides=SMALL)
     now = env.reset()
     for step in range(steps):
@@ -138,7 +138,7 @@ def played(n_worlds, seed, steps=60):
 
 def test_the_same_seed_gives_the_same_worlds_and_two_at_once_are_those_of_one_by_one():
     both = played(2, 5)
-    assert not differing(both, played(2, 5)) and differing(both, played(2, 9))
+    assert differing(both[:1], both[1:])
     for index in range(2):
         assert not differing(both[torch.tensor([index])], played(1, 5 + index))
     assert both.burned.any() and both.vehicles.acts.any()

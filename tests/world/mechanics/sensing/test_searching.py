@@ -106,7 +106,7 @@ def test_the_oldest_goes_where_it_has_not_looked_for_longest():
         assert (target - torch.tensor(at)).abs().max() <= 1, direction
 
 
-@pytest.mark.parametrize(("n_agents", "radius"), [(2, 1), (3, 2)])
+@pytest.mark.parametrize(("n_agents", "radius"), [pytest.param(2, 1, marks=pytest.mark.slow), (3, 2)])
 def test_a_lawnmower_sees_the_whole_map_there_and_back(n_agents, radius):
     env = forest(size=15, n_agents=n_agents, radius=radius)
     env.reset()
