@@ -264,7 +264,7 @@ def test_the_live_page_shows_a_plug_in_and_hands_it_on(here, tmp_path):
 # Worlds alone
 
 
-COMPOSED = ("skirmish", "hetero", "search", "wui", "landfire", "spread_shift", "paper_marl")
+COMPOSED = ("agencies", "front", "haksar", "paper_marl", "skirmish", "spread_shift", "wildland", "wui")
 """Scenarios that between them choose an option of every group that worlds have."""
 
 
