@@ -131,6 +131,25 @@ def all_experiments(_conf_with_docs, monkeypatch):
 
 
 @pytest.fixture(autouse=True, scope="session")
+def _quick_defaults():
+    """Spare Hydra the map of choices that it makes for each file of a configuration, and reads where one has ``${``.
+
+    To compose a configuration takes a third less time.
+    """
+    from hydra._internal import defaults_list
+
+    make = defaults_list._create_interpolation_map
+
+    def made_if_read(overrides, defaults, self_added):
+        is_read = any(not each.is_self() and each.is_interpolation() for each in defaults)
+        return make(overrides, defaults, self_added) if is_read else None
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(defaults_list, "_create_interpolation_map", made_if_read)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
 def _no_files_at_home(tmp_path_factory):
     os.environ["XDG_CACHE_HOME"] = str(tmp_path_factory.mktemp("cache"))
 

@@ -63,15 +63,21 @@ def test_the_example_of_a_prediction_runs(capsys):
 def test_the_examples_from_python_run(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     training, evaluation = blocks("python.md")
-    smaller = {"20_000": "256", "n_worlds=64": "n_worlds=4", "10_000": "128", "episodes=64": "episodes=2"}
+    smaller = {
+        "20_000": "256",
+        "n_worlds=64": "n_worlds=4",
+        "10_000": "128",
+        "episodes=64": "episodes=2",
+        "(128": "(16",
+    }
     for shown, less in {**smaller, 'folder="': 'horizon=8, model=dict(actor_hidden=[8]), folder="'}.items():
         assert shown in training
         training = training.replace(shown, less)
     names: dict = {}
     exec(training, names)
     assert re.match(r"(\d+ steps: \d+% saved\n)+skirmish horizon=8: 2 fires", capsys.readouterr().out)
-    assert len(names["loss"]) > 1 and names["rollout"].shape == (8, 128)
-    exec(evaluation, names)
+    assert len(names["loss"]) > 1 and names["rollout"].shape == (8, 16)
+    exec(evaluation.replace("episodes=8", "episodes=2").replace('"skirmish", ', '"skirmish", horizon=16, '), names)
     assert re.fullmatch(r"\d+% saved, \d+% without a team\n", capsys.readouterr().out)
 
 
@@ -90,7 +96,7 @@ def test_the_example_of_a_live_match_runs(capsys):
 def test_the_example_of_a_match_as_a_file_runs(tmp_path, monkeypatch):
     pytest.importorskip("viser", reason="needs the extra live")
     monkeypatch.chdir(tmp_path)
-    exec(blocks("live.md")[0], {})
+    exec(blocks("live.md")[0].replace("range(20)", "range(3)"), {})
     assert "<h1>default and local</h1>" in (tmp_path / "match.html").read_text()
 
 

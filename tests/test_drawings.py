@@ -65,9 +65,24 @@ def is_drawn(path):
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=BELIEVES if name == "belief" else ()) for name in WORLD])
-def test_every_figure_is_drawn(name, tmp_path, matplotlib):
+def test_every_figure_is_drawn(name, tmp_path, matplotlib, monkeypatch):
+    if name == "house":
+        monkeypatch.setattr("drawings.house.PACKAGE", small_package(tmp_path / "small"))
     path = draw_figure(lambda: WORLD[name](**SMALL[name]), tmp_path / "new" / f"{name}.png")
     assert is_drawn(path)
+
+
+def small_package(folder):
+    """Make a package of three rooms with a world of two: that of the project has hundreds of files to read."""
+    for room, text in {"top": "from small.world.law.fire import Fire", "world/law/fire": "", "world/air": ""}.items():
+        (path := folder / f"{room}.py").parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"{text}\n" * 40)
+    return folder
+
+
+@pytest.mark.slow
+def test_the_house_of_the_project_is_drawn(tmp_path, matplotlib):
+    assert is_drawn(draw_figure(WORLD["house"], tmp_path / "house.png"))
 
 
 @BELIEVES

@@ -13,7 +13,7 @@ from warp_torchrl.runs.config.construction import ConfigError
 
 TINY = [
     "landscape.size=12",
-    "horizon=16",
+    "horizon=8",
     "n_worlds=4",
     "collector.steps=8",
     "collector.grows_at=0",

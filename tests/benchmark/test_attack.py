@@ -7,7 +7,7 @@ from warp_torchrl.benchmark.attack import VALUES, attack_table, draw_attack, esc
 from warp_torchrl.runs.config.construction import ConfigError
 
 pytestmark = needs_scenario("initial_attack")
-SMALL = ("landscape.size=16", "horizon=30", "mechanics.values.escape_area=2", "fire.fire_deviation=0")
+SMALL = ("landscape.size=16", "horizon=20", "mechanics.values.escape_area=2", "fire.fire_deviation=0")
 
 
 def test_fires_that_nobody_fights_escape_and_those_fought_at_once_do_not():

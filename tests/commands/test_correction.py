@@ -24,7 +24,7 @@ def test_the_person_s_acts_are_the_baseline_s_of_so_many_steps_ago(weak_run):
     """Held against the baseline in a replay of what was recorded, which draws nothing."""
     for delay in (0, 2):
         person = Person(delay=delay, error=0.0, threshold=1.0, by="coordinated")
-        for played in corrected(weak_run, person)[1]:
+        for played in corrected(weak_run, person, episodes=2)[1]:
             replay, recording = Replay(played.recording), played.recording
             baseline, advice = HEURISTICS["coordinated"](replay.env), []
             for step, state in enumerate(replay.states()):

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -14,6 +15,13 @@ from warp_torchrl.world.terrain.geotiff import local_grid, write_geotiff
 pytest.importorskip("rasterio", reason="rasters need the extra gis")
 SIZE = (12, 16)
 DAY = "2024-07-01"
+
+
+@pytest.fixture(autouse=True)
+def _figures(request):
+    is_drawn = request.node.name == "test_an_ensemble_is_scored_at_each_perimeter"
+    if not is_drawn and find_spec("matplotlib") is not None:
+        request.getfixturevalue("blank_figures")
 
 
 @pytest.fixture

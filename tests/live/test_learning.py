@@ -26,8 +26,18 @@ def composed(given):
     return plain(compose_config("train", [each for each in given if not each.startswith(("imitation", "hydra"))]))
 
 
-@pytest.mark.parametrize("policy", ["default", "generalist", "single", "skirmish"])
-@pytest.mark.parametrize("overrides", [(), ("scenario=large", "team.n_agents=3", "seed=5")])
+OTHERS = ("scenario=large", "team.n_agents=3", "seed=5")
+
+
+@pytest.mark.parametrize(
+    ("policy", "overrides"),
+    [
+        ("generalist", ()),
+        ("skirmish", OTHERS),
+        *(pytest.param(policy, (), marks=pytest.mark.slow) for policy in ("default", "single", "skirmish")),
+        *(pytest.param(policy, OTHERS, marks=pytest.mark.slow) for policy in ("default", "generalist", "single")),
+    ],
+)
 def test_the_policy_s_own_configuration_is_trained_in_the_scenario_that_is_played(policy, overrides):
     record = NamedPolicy(policy).checkpoint.saved_config()
     values = composed(arguments(policy, record, overrides, PEOPLE, RUN, 200_000))

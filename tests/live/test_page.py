@@ -50,14 +50,14 @@ def test_it_listens_to_this_machine_alone(page):
         other.connect(("127.0.0.2", port))  # another address of this machine, as a network's would be
 
 
-@pytest.mark.parametrize("path", ["/../../../../../../etc/passwd", "/%2e%2e/%2e%2e/%2e%2e/__init__.py", "//etc/passwd"])
-def test_no_file_outside_of_the_browser_s_program_is_served(page, path):
-    link = HTTPConnection(page.address.host, page.address.port, timeout=10)
-    link.request("GET", path)
-    answer = link.getresponse()
-    body = answer.read()
-    assert answer.status == 404 or (b"root:" not in body and b"import" not in body)
-    link.close()
+def test_no_file_outside_of_the_browser_s_program_is_served(page):
+    for path in ("/../../../../../../etc/passwd", "/%2e%2e/%2e%2e/%2e%2e/__init__.py", "//etc/passwd"):
+        link = HTTPConnection(page.address.host, page.address.port, timeout=10)
+        link.request("GET", path)
+        answer = link.getresponse()
+        body = answer.read()
+        assert answer.status == 404 or (b"root:" not in body and b"import" not in body), path
+        link.close()
 
 
 def test_nothing_is_shared_when_a_browser_asks(page, monkeypatch):
@@ -91,10 +91,10 @@ def _until(holds, seconds=60.0):
         time.sleep(0.05)
 
 
-@pytest.mark.parametrize("pace", [0, -3, 31, float("nan"), float("inf")])
-def test_a_pace_that_is_none_is_refused(page, pace):
-    with pytest.raises(ValueError, match=r"steps a second must be in 1\.\.30, got"):
-        page.set_pace(pace)
+def test_a_pace_that_is_none_is_refused(page):
+    for pace in (0, -3, 31, float("nan"), float("inf")):
+        with pytest.raises(ValueError, match=r"steps a second must be in 1\.\.30, got"):
+            page.set_pace(pace)
     page.set_pace(30)
     assert page.pace == 30.0
 

@@ -13,7 +13,7 @@ from warp_torchrl.runs.policies.named_policy import NamedPolicy
 
 @pytest.mark.parametrize("name", ["skirmish", "local", pytest.param("random", marks=pytest.mark.slow)])
 def test_a_match_is_what_an_evaluation_of_its_seed_plays(name):
-    match = Match(Setting(policy=name, seed=1_000_005, overrides=("scenario=skirmish", "horizon=60")))
+    match = Match(Setting(policy=name, seed=1_000_005, overrides=("landscape.size=16", "horizon=40")))
     while not match.ended:
         match.step()
     side = match.sides[0]

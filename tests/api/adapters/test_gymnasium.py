@@ -123,8 +123,15 @@ def test_gymnasium_makes_a_batch_by_name():
     env.close()
 
 
-@pytest.mark.parametrize("observation", ["surroundings", "paper"])
-@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+@pytest.mark.parametrize(
+    ("mode", "observation"),
+    [
+        (AutoresetMode.NEXT_STEP, "surroundings"),
+        (AutoresetMode.SAME_STEP, "paper"),
+        pytest.param(AutoresetMode.NEXT_STEP, "paper", marks=pytest.mark.slow),
+        pytest.param(AutoresetMode.SAME_STEP, "surroundings", marks=pytest.mark.slow),
+    ],
+)
 def test_worlds_start_anew_exactly_as_in_gymnasium_s_own_vector(mode, observation):
     options = {**BURNS_OUT, "observation": observation}
     ours = vector(3, autoreset_mode=mode, **options)

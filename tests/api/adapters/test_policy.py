@@ -1,5 +1,7 @@
 """Trained policies on the views' numpy observations."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 import torch
@@ -21,8 +23,19 @@ def policy_for(scenario, model=None, algorithm=None, **options):
     return env, TrainedPolicy(module.requires_grad_(False).eval(), "deterministic", signature(env))
 
 
-@pytest.mark.parametrize("observation", ["surroundings", "paper"])
-@pytest.mark.parametrize("sharing", ["team", "role", "none"])
+def apart(quick, *values):
+    """The given cases, and all others of the values, which are slow."""
+    others = (each for each in product(*values) if each not in quick)
+    return [*quick, *(pytest.param(*each, marks=pytest.mark.slow) for each in others)]
+
+
+OBSERVATIONS = ("surroundings", "paper")
+
+
+@pytest.mark.parametrize(
+    ("sharing", "observation"),
+    apart([("team", "paper"), ("role", "surroundings"), ("none", "paper")], ("team", "role", "none"), OBSERVATIONS),
+)
 def test_a_team_acts_as_it_does_in_torchrl(sharing, observation):
     model = Mlp(actor_hidden=(32,), sharing=sharing)
     ours, policy = policy_for("hetero", model, observation=observation)
@@ -40,9 +53,15 @@ def test_a_team_acts_as_it_does_in_torchrl(sharing, observation):
 
 
 @needs("radio")
-@pytest.mark.parametrize("observation", ["surroundings", "paper"])
-@pytest.mark.parametrize("layout", ["dict", "flat"])
-@pytest.mark.parametrize("delay", [0, 2])
+@pytest.mark.parametrize(
+    ("delay", "layout", "observation"),
+    apart(
+        [(0, "dict", "surroundings"), (2, "flat", "surroundings"), (2, "dict", "paper"), (0, "flat", "paper")],
+        (0, 2),
+        ("dict", "flat"),
+        OBSERVATIONS,
+    ),
+)
 def test_a_team_that_talks_acts_as_it_does_in_torchrl(delay, layout, observation):
     model = Mlp(actor_hidden=(32,), messages="graph")
     options = {"mechanics.radio.carries": "graph", "mechanics.radio.range": 4, "mechanics.radio.delay": delay}

@@ -115,8 +115,7 @@ def test_a_search_without_a_trained_trial_has_a_table_and_no_best(tmp_path):
     [
         ["algorithm=a2c", "scenario=single", "algorithm.learning_rate=3e-05", "n_worlds=64"],
         ["experiment=skirmish", "model.actor_hidden=[64,32]", "imitation.teacher=null", "model.activation=relu"],
-        ["total_frames=1_000", "experiment=quick", "algorithm.value_norm=False"],
-        ["model=cnn"],
+        ["total_frames=1_000", "experiment=quick", "model=cnn", "algorithm.value_norm=False"],
     ],
 )
 def test_the_best_values_are_an_experiment(overrides, tmp_path):

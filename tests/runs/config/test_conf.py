@@ -456,8 +456,7 @@ def test_a_yaml_file_that_was_edited_is_read_anew(tmp_path, monkeypatch):
                 ["scenario=search", "model.messages=both", "mechanics.radio.loss=0.0"],
                 ["mechanics.radio.carries=map", "mechanics.radio.loss=0.0"],
             ),
-            (["wind=calm", "fire=paper"], ["wind=calm", "fire=paper"]),
-            (["fire=paper", "fire.beta=0.5"], ["fire=paper", "fire.beta=0.5"]),
+            (["wind=calm", "fire=paper", "fire.beta=0.5"], ["wind=calm", "fire=paper", "fire.beta=0.5"]),
             (["fire=spread", "steps_per_tick=4"], ["fire=spread", "steps_per_tick=4"]),
         ]
         if can_play(each[0])

@@ -264,7 +264,17 @@ def test_the_live_page_shows_a_plug_in_and_hands_it_on(here, tmp_path):
 # Worlds alone
 
 
-@pytest.mark.parametrize("scenario", sorted(path.stem for path in (conf_folder() / "scenario").glob("*.yaml")))
+COMPOSED = ("agencies", "front", "haksar", "paper_marl", "skirmish", "spread_shift", "wildland", "wui")
+"""Scenarios that between them choose an option of every group that worlds have."""
+
+
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        pytest.param(path.stem, marks=() if path.stem in COMPOSED else pytest.mark.slow)
+        for path in sorted((conf_folder() / "scenario").glob("*.yaml"))
+    ],
+)
 def test_worlds_are_composed_as_a_training_composes_them(scenario):
     alone, whole = (plain(compose_config(name, [f"scenario={scenario}"])) for name in ("worlds", "train"))
     for key in (*WORLD_KEYS, *ENVIRONMENT):

@@ -20,7 +20,7 @@ from warp_torchrl.system.shipped import policy_names
 SHIPPED = Path(__file__).parents[3] / "docs" / "policies"
 SCENARIOS = {"default": "default", "generalist": "default", "skirmish": "skirmish", "single": "single"}
 """The scenario in which each is evaluated where nothing else is asked."""
-TO_PLAY = ["skirmish", "single", *(pytest.param(name, marks=pytest.mark.slow) for name in ("default", "generalist"))]
+TO_PLAY = ["skirmish", *(pytest.param(name, marks=pytest.mark.slow) for name in ("default", "generalist", "single"))]
 LAST = {"generalist": "generalist_distilled"}
 """The experiment by which one was trained last, where that is not the one of its name."""
 
