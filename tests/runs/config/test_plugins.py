@@ -265,7 +265,7 @@ def test_the_live_page_shows_a_plug_in_and_hands_it_on(here, tmp_path):
 
 
 COMPOSED = ("agencies", "front", "haksar", "paper_marl", "skirmish", "spread_shift", "wildland", "wui")
-"""Scenarios that between them choose an option of every group that worlds have."""
+"""Scenarios of the quick suite, which between them choose options of most groups that worlds have."""
 
 
 @pytest.mark.parametrize(
