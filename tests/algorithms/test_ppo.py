@@ -153,22 +153,18 @@ def test_a_few_updates_raise_the_return_of_a_bandit(make_small_env):
     """Reward 1 for one action and nothing else: the policy must find it in a few dozen updates."""
     env = make_small_env(16, small_world(horizon=400))
     learner = Ppo(learning_rate=3e-3, minibatch_size=64).build(env, Mlp(actor_hidden=(32,), critic_hidden=(32,)), 128)
-    now = env.reset()
+    now = env.reset()[:, None].expand(16, 8)
     wanted = 10  # stay, which is always open
+    flags = {name: torch.ones(16, 8, 1, dtype=torch.bool) for name in ("done", "terminated")}
     shares = []
     for _ in range(20):
-        steps = []
-        for _ in range(8):
-            with torch.no_grad():
-                step = learner.policy(now.clone())
-            reward = (step["agents", "action"] == wanted).float()[..., None]
-            flags = {name: torch.ones(16, 1, dtype=torch.bool) for name in ("done", "terminated")}
-            following = now.clone().update({**flags, "truncated": ~flags["done"]})
-            following["agents", "reward"] = reward
-            steps.append(step.set("next", following))
-        batch = torch.stack(steps, 1)
+        with torch.no_grad():
+            batch = learner.policy(now.clone())
+        following = now.clone().update({**flags, "truncated": ~flags["done"]})
+        following["agents", "reward"] = (batch["agents", "action"] == wanted).float()[..., None]
+        batch["next"] = following
         shares.append(batch["next", "agents", "reward"].mean().item())
-        learner.store(batch.contiguous())
+        learner.store(batch)
         for sample in learner.samples():
             terms = learner.loss(sample)
             sum(terms[key] for key in learner.loss_keys).backward()

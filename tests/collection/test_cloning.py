@@ -158,7 +158,7 @@ def test_a_policy_comes_to_do_what_people_did(several, people, tmp_path):
 
 
 def trained(run, people, stop_after=None):
-    training = learning(run, people, "total_frames=384", "imitation.until=0.8")
+    training = learning(run, people, "total_frames=256", "imitation.until=0.8")
     if stop_after is None:
         training.train()
         return training
@@ -177,9 +177,9 @@ def test_a_run_resumed_equals_a_run_not_interrupted(people, tmp_path):
     for name in ("whole", "again", "cut"):
         (tmp_path / name).mkdir()
     whole, again = trained(tmp_path / "whole", people), trained(tmp_path / "again", people)
-    trained(tmp_path / "cut", people, stop_after=3)
+    trained(tmp_path / "cut", people, stop_after=2)
     torch.manual_seed(123)
-    resumed = learning(tmp_path / "cut", people, "total_frames=384", "imitation.until=0.8")
+    resumed = learning(tmp_path / "cut", people, "total_frames=256", "imitation.until=0.8")
     resumed.load_state_dict(newest(tmp_path / "cut")[0].training())
     resumed.train()
     for name, value in weights(whole).items():
@@ -199,7 +199,7 @@ def test_a_run_goes_on_with_no_other_recordings(people, tmp_path):
     other = tmp_path / "others"
     save_recording(played(seed=9), other)
     with pytest.raises(CheckpointError, match=r"imitation.demonstrations must hold the recordings that the run began"):
-        learning(tmp_path, other, "total_frames=384").load_state_dict(newest(tmp_path)[0].training())
+        learning(tmp_path, other, "total_frames=256").load_state_dict(newest(tmp_path)[0].training())
 
 
 def test_without_demonstrations_the_learner_is_as_it_was(people, tmp_path):

@@ -50,7 +50,7 @@ def test_it_is_an_environment_of_torchrl():
 
 
 def test_with_all_chances_at_the_target_it_is_the_plain_environment():
-    same(played(leveled(chances=(0.0, 0.0, 1.0)), 30), played(WildfireEnv(TARGET, n_worlds=16), 30))
+    same(played(leveled(chances=(0.0, 0.0, 1.0)), 15), played(WildfireEnv(TARGET, n_worlds=16), 15))
 
 
 def test_the_least_and_the_largest_draw_are_of_levels_that_have_a_chance(monkeypatch):
@@ -64,9 +64,9 @@ def test_what_comes_late_comes_as_in_the_plain_environment():
     radio = pytest.importorskip("warp_torchrl.world.mechanics.radio.radio")
     late = replace(TARGET, mechanics=(radio.Radio(carries="graph", delay=2, loss=0.2),))
     env = LeveledEnv([replace(late, steps_per_tick=6), late], n_worlds=8)
-    same(played(env, 30), played(WildfireEnv(late, n_worlds=8), 30))
+    same(played(env, 15), played(WildfireEnv(late, n_worlds=8), 15))
     env.draw_by([0.5, 0.5])
-    env.rollout(20, break_when_any_done=False)
+    env.rollout(15, break_when_any_done=False)
     other = LeveledEnv(env.levels, n_worlds=8, seed=9)
     other.load_state_dict(env.state_dict())
     assert env.level.unique().tolist() == [0, 1] and (env._observe() == other._observe()).all()
@@ -82,7 +82,7 @@ def test_a_world_s_episode_is_that_of_its_level_alone(level):
 
 
 def test_episodes_have_the_horizon_of_the_level_that_they_started_at():
-    found = played(leveled(), 60)
+    found = played(leveled(), 36)
     ended, length = found["next", "done"][..., 0], found["next", "info", "episode_length"][..., 0]
     cut = found["next", "truncated"][..., 0]
     for level, world in enumerate(LEVELS):
@@ -113,12 +113,12 @@ def test_chances_that_change_hold_for_the_next_start():
 
 def test_a_state_that_is_restored_goes_on_as_it_would_have():
     first, second = leveled(), leveled(seed=77)
-    played(first, 17)
+    played(first, 9)
     second.load_state_dict(first.state_dict())
     second.load_state_dict({})  # what TorchRL's collectors keep of it
     assert len(set(first.level.tolist())) == 3 and torch.equal(first.level, second.level)
     shown = [first._observe(), second._observe()]
-    for _ in range(25):
+    for _ in range(13):
         action = torch.randint(11, (16, 2))
         both = [
             env.step_and_maybe_reset(seen.set(("agents", "action"), action))

@@ -10,14 +10,14 @@ from torchrl.collectors import Collector
 from torchrl.envs import DeviceCastTransform, EnvBase, ParallelEnv, SerialEnv, TransformedEnv
 
 from tests.conftest import small_world
-from tests.env.scenarios import WORLDS, env_of
+from tests.env.scenarios import NAMES, WORLDS, env_of
 from warp_torchrl.env import GroupedEnv, LeveledEnv, WildfireEnv
 from warp_torchrl.env.reset_cache import ResetCache
 from warp_torchrl.env.reset_pool import ResetPool
 
 CUDA = [pytest.mark.cuda, pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA device")]
 DEVICES = ["cpu:0", pytest.param("cuda", marks=CUDA)]
-STEPS = 7
+STEPS = 6
 
 
 def tensors_of(thing, name="env"):
@@ -95,11 +95,25 @@ def meta(monkeypatch):
 
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("name", WORLDS)
-def test_every_part_of_torchrl_moves_every_scenario(maps, name, device):
+def test_every_scenario_moves_with_all_that_it_keeps(maps, name, device, request):
     expected = played(env_of(name, maps, device=device))
     moved = env_of(name, maps)
     assert moved.to(device) is moved and moved.device.type == torch.device(device).type and not elsewhere(moved, device)
-    assert same(played(moved), expected)
+    assert same(played(moved), expected) and not elsewhere(moved, device)
+    meta = request.getfixturevalue("meta")
+    assert moved.to(meta) is moved and moved.world_state.cells.shape == (3, *moved.world.size)
+    assert not [way for way in elsewhere(moved, meta) if not re.search(r"_spec|\.world\.|_check\.__self__", way)], (
+        "a world is rules alone"
+    )
+
+
+@pytest.mark.parametrize("device", DEVICES)
+@pytest.mark.parametrize(
+    "name",
+    [each if each in ("skirmish", "all of hetero") else pytest.param(each, marks=pytest.mark.slow) for each in NAMES],
+)
+def test_every_part_of_torchrl_moves_a_scenario(maps, name, device):
+    expected = played(env_of(name, maps, device=device))
     cast = TransformedEnv(env_of(name, maps), DeviceCastTransform(device))
     assert all(map(alike, played(cast), expected))  # its worlds stay where they were
     serial = SerialEnv(2, lambda: env_of(name, maps), device=device)
@@ -118,17 +132,6 @@ def test_what_a_collector_keeps_is_loaded_again(maps):
     again.load_state_dict(kept.state_dict())
     assert sum(batch.numel() for batch in again) == 18 - frames
     kept.shutdown(), again.shutdown()
-
-
-@pytest.mark.parametrize("name", WORLDS)
-def test_all_that_a_running_environment_keeps_moves(maps, meta, name):
-    env = env_of(name, maps)
-    played(env)
-    assert not elsewhere(env, "cpu")
-    assert env.to(meta) is env and env.world_state.cells.shape == (3, *env.world.size)
-    assert not [way for way in elsewhere(env, meta) if not re.search(r"_spec|\.world\.|_check\.__self__", way)], (
-        "a world is rules alone"
-    )
 
 
 @pytest.mark.parametrize("device", DEVICES)

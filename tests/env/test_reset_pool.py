@@ -10,7 +10,7 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.reset_pool import ResetPool
 from warp_torchrl.system.device import unread
 
-SHORT = ["landscape.size=10", "horizon=12"]
+SHORT = ["landscape.size=10", "horizon=5"]
 LATE = ["scenario=search", "mechanics.radio.carries=both", "mechanics.radio.delay=2", "mechanics.radio.loss=0.2"]
 TALKS = ["mechanics.radio.carries=graph", "mechanics.radio.delay=2"]
 AT_LENGTH = [["scenario=lightning"], ["wind=wandering"], LATE]
@@ -36,9 +36,9 @@ def played(steps, *overrides):
     ids=" ".join,
 )
 def test_worlds_play_the_same_episodes_though_nobody_asks_which_have_ended(overrides):
-    expected, env = played(40, *overrides)
+    expected, env = played(18, *overrides)
     with unread():
-        found, other = played(40, *overrides)
+        found, other = played(18, *overrides)
     assert (env._episodes > 3).all()
     for name, value in env.state_dict()["worlds"].items():
         assert torch.equal(other.state_dict()["worlds"][name], value), name

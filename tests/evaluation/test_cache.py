@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from tests.world.mechanics import of_mechanics
+from tests.env.scenarios import FURTHER, OF_MECHANICS
 from warp_torchrl.evaluation import cache
 from warp_torchrl.evaluation import evaluate as evaluation_module
 from warp_torchrl.evaluation.play import play_heuristics
@@ -133,12 +133,15 @@ def test_copies_of_layers_on_devices_do_not_count():
     assert cache.digest({"a": 1}) != cache.digest({"a": 2})
 
 
-OF_MECHANICS = [scenario.removeprefix("scenario=") for scenario, *_ in of_mechanics("WORLDS").values()]
+SCENARIOS = ("default", "hazard", "water", "lightning", "paper_marl", "shift")
+TOLD = [(f"scenario={each}",) for each in SCENARIOS] + [FURTHER[name] for name in OF_MECHANICS if name in FURTHER]
 
 
-@pytest.mark.parametrize("scenario", ["default", "hazard", "water", "lightning", "paper_marl", "shift", *OF_MECHANICS])
-def test_all_that_episodes_of_a_scenario_follow_from_can_be_told(scenario):
-    assert len(cache._paths(plan_of(scenario=scenario), list(HEURISTICS))) == len(HEURISTICS)
+@pytest.mark.parametrize("overrides", TOLD, ids=" ".join)
+def test_all_that_episodes_of_a_scenario_follow_from_can_be_told(overrides):
+    scenario, *rest = overrides
+    plan = plan_of(*rest, scenario=scenario.removeprefix("scenario="))
+    assert len(cache._paths(plan, list(HEURISTICS))) == len(HEURISTICS)
 
 
 def test_what_a_user_adds_is_not_kept(monkeypatch):

@@ -29,7 +29,7 @@ def alike(one, other):
 @pytest.mark.parametrize("name", [name for name in HEURISTICS if not HEURISTICS[name].is_stateful])
 @pytest.mark.parametrize("watch", [pytest.param(False, marks=pytest.mark.slow), True], ids=["", "watched"])
 def test_a_heuristic_plays_as_step_by_step(name, watch, monkeypatch):
-    env = WildfireEnv(small_world(team=Team(n_agents=2, roles=("ugv", "uav")), horizon=14), n_worlds=9)
+    env = WildfireEnv(small_world(team=Team(n_agents=2, roles=("ugv", "uav")), horizon=8), n_worlds=9)
     policy = HEURISTICS[name](env)
     assert fits(env, policy)
     quick, state = play(env, policy, 5, watch=watch), env.world_state
@@ -43,7 +43,7 @@ def test_a_heuristic_plays_as_step_by_step(name, watch, monkeypatch):
 @pytest.mark.parametrize("observation", [Surroundings(), Paper()], ids=["surroundings", "paper"])
 @pytest.mark.parametrize("lamed", [False, True], ids=["", "without an agent"])
 def test_a_trained_policy_plays_as_step_by_step(mode, observation, lamed, monkeypatch):
-    env = WildfireEnv(small_world(), observation=observation, n_worlds=9)
+    env = WildfireEnv(small_world(horizon=12), observation=observation, n_worlds=9)
     policy = trained(env, sharing="role", symmetry="none")
     policy = WithoutAgent(policy, 1, env.world.team) if lamed else policy
     assert fits(env, policy)

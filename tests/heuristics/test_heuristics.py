@@ -26,7 +26,7 @@ def test_every_heuristic_acts_within_the_mask_or_does_nothing(make_small_env, na
     env = make_small_env(5)
     policy = HEURISTICS[name](env)
     now = env.reset()
-    for _ in range(15):
+    for _ in range(8):
         now = policy(now)
         action = now["agents", "action"]
         assert action.dtype == torch.int64 and action.shape == (5, 2)
@@ -43,7 +43,7 @@ def test_no_op_without_stay_changes_nothing(make_small_env):
 @pytest.mark.parametrize("name", HEURISTICS)
 def test_heuristics_repeat_themselves_side_by_side_and_do_the_same_where_masks_are_off(make_small_env, name):
     shown, hidden, again = (
-        make_small_env(4, small_world(team=Team(n_agents=2, allow_stay=False), action_masking=each, horizon=16))
+        make_small_env(4, small_world(team=Team(n_agents=2, allow_stay=False), action_masking=each, horizon=8))
         for each in (True, False, False)
     )
     assert hidden.reset()["agents", "action_mask"].all() and not shown.reset()["agents", "action_mask"].all()

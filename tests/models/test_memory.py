@@ -61,7 +61,11 @@ def make_env(make_small_env):
     return make
 
 
-def played(env, policy, steps=24):
+STEPS = 14
+"""More than the nine of an episode."""
+
+
+def played(env, policy, steps=STEPS):
     with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
         return env.rollout(steps, policy, break_when_any_done=False).contiguous()
 
@@ -74,7 +78,7 @@ def test_a_sequence_says_what_its_steps_said(make_env, model):
     played(env, policy, steps=5)  # so that the sequence begins with a memory
     with torch.no_grad():
         now, steps = env.reset().clone(), []
-        for _ in range(24):
+        for _ in range(STEPS):
             acted = env.step(policy(now))
             steps.append(acted.clone())
             now = env.step_mdp(acted)
@@ -100,7 +104,7 @@ def test_what_was_seen_before_counts_until_an_episode_begins(make_env, model):
     changed = (before != after).any(-1)
     begins = batch[OWN][:, :, 0, 2] == 1.0
     for world in range(len(changed)):
-        end = next(step for step in range(3, 24) if begins[world, step])
+        end = next(step for step in range(3, STEPS) if begins[world, step])
         assert not changed[world, :2].any()
         assert changed[world, 2 : min(end, 6), 0].all(), "later it may be too faint for the last digit"
         assert not changed[world, end:].any() and not changed[world, :, 1:].any()
@@ -124,7 +128,7 @@ def test_a_world_s_memory_is_its_own(make_env):
     batch = played(env, policy)
     alone = lively(Ppo().policy(signature(env), MODELS["none"]))
     alone.load_state_dict(policy.state_dict())
-    for step in range(24):
+    for step in range(STEPS):
         now = batch[2:3, step].exclude(LOGITS, MEMORY, ACTION)
         with torch.no_grad():
             torch.testing.assert_close(alone(now)[LOGITS], batch[2:3, step][LOGITS])
@@ -158,7 +162,7 @@ def test_what_was_shown_at_first_is_learnt_to_matter_later_by_those_who_remember
     rates = {"learning_rate": 1e-2, "learning_rate_end": 1.0, "gamma": 0.5, "entropy_coeff": 0.0}
     learner = kind(minibatch_size=24, **rates).build(env, model, 48)
     shares = []
-    for _ in range(40):
+    for _ in range(30):
         cue = torch.randint(2, (16, 2))
         batch, right = asked(env, learner, cue)
         shares.append(right.float().mean().item())
@@ -193,10 +197,10 @@ def asked(env, learner, cue):
 def test_a_minibatch_is_made_of_whole_sequences(make_env):
     env = make_env()
     learner = Ppo(minibatch_size=50, epochs=1).build(env, MODELS["canonical"], 6 * 24)
-    learner.store(played(env, learner.explore))
+    learner.store(played(env, learner.explore, steps=24))
     assert [list(sample.shape) for sample in learner.samples()] == [[2, 24]] * 3
     learner = Ppo(minibatch_size=10, epochs=1).build(env, MODELS["canonical"], 6 * 24)
-    learner.store(played(env, learner.explore))
+    learner.store(played(env, learner.explore, steps=24))
     assert [list(sample.shape) for sample in learner.samples()] == [[1, 24]] * 6
 
 
@@ -207,7 +211,7 @@ def test_numpy_agents_remember_by_name(make_env):
     batch = played(env, policy)
     together, apart = (TrainedPolicy(policy, "deterministic", signature(env)).numpy_policy() for _ in range(2))
     with set_exploration_type(ExplorationType.DETERMINISTIC), torch.no_grad():
-        expected = [policy(batch[:, step].exclude(LOGITS, MEMORY, ACTION))[ACTION][0].tolist() for step in range(24)]
+        expected = [policy(batch[:, step].exclude(LOGITS, MEMORY, ACTION))[ACTION][0].tolist() for step in range(STEPS)]
     for step, wanted in enumerate(expected):
         seen = {
             name: {

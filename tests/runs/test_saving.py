@@ -91,7 +91,10 @@ def test_saves_by_the_clock_change_nothing(tmp_path, name):
     with pytest.raises(KeyboardInterrupt):
         often.train()
     assert often.clock.saves == LAST - 1
-    assert sorted(int(each.name) for each in (tmp_path / "often" / "checkpoints").iterdir()) == [64, 80]
+    assert sorted(int(each.name) for each in (tmp_path / "often" / "checkpoints").iterdir()) == [
+        16 * (LAST - 2),
+        16 * (LAST - 1),
+    ]
     resumed = tiny(tmp_path / "often", *own)
     resumed.load_state_dict(newest(tmp_path / "often")[0].training())
     resumed.train()
@@ -104,7 +107,7 @@ def test_saves_by_the_clock_change_nothing(tmp_path, name):
 
 
 def test_the_interval_s_checkpoints_are_the_same_whatever_the_clock_does(tmp_path):
-    run = tiny(tmp_path, *TINIER, "checkpoint.interval=32", "checkpoint.keep=4")
+    run = tiny(tmp_path, *TINIER, "total_frames=96", "checkpoint.interval=32", "checkpoint.keep=4")
     run.clock = SaveClock(1.0, run._size, time := Time())
     learn = run._learn
 

@@ -14,11 +14,11 @@ from warp_torchrl.training.recorded import RecordedUpdate
 
 
 def learned(folder, *overrides):
-    """Rows and weights after three batches."""
+    """Rows and weights after two batches."""
     with unread():
         run = training(folder, *overrides)
         batches = run.batches()
-        rows = [run._learn(next(batches)) for _ in range(3)]
+        rows = [run._learn(next(batches)) for _ in range(2)]
         run.close()
     return rows, [each.detach().clone() for each in run.learner.loss.parameters()], run
 
@@ -28,10 +28,10 @@ MORE = [["algorithm=a2c"], ["algorithm.minibatch_size=100"]]
 
 @pytest.mark.parametrize("overrides", [[], *(pytest.param(each, marks=pytest.mark.slow) for each in MORE)], ids=str)
 def test_recorded_updates_learn_the_same_at_a_rate_that_falls(tmp_path, overrides):
-    rows, weights, _ = learned(tmp_path, "collector.grows_at=0", "total_frames=800", *overrides)
-    recorded_rows, recorded, run = learned(tmp_path, "graph=true", "total_frames=800", *overrides)
+    rows, weights, _ = learned(tmp_path, "collector.grows_at=0", "total_frames=560", *overrides)
+    recorded_rows, recorded, run = learned(tmp_path, "graph=true", "total_frames=560", *overrides)
     rate = run.learner.optimizer.param_groups[0]["lr"]
-    assert isinstance(rate, torch.Tensor) and float(rate) == pytest.approx(1e-3 * (1.0 - 0.95 * 768 / 800))
+    assert isinstance(rate, torch.Tensor) and float(rate) == pytest.approx(1e-3 * (1.0 - 0.95 * 512 / 560))
     assert isinstance(run._update, RecordedUpdate) and run.env._recorded is not None
     for one, other in zip(rows, recorded_rows, strict=True):
         known = {name: value for name, value in one.items() if value is not None}

@@ -68,7 +68,15 @@ def test_every_sample_of_every_kind_is_learned_from_once_a_pass(tmp_path):
 
 
 def test_columns_tell_what_each_kind_saves(tmp_path, caplog):
-    training = tiny(tmp_path, *THREE, "total_frames=128", "evaluation.interval=128", "evaluation.episodes=2")
+    training = tiny(
+        tmp_path,
+        *THREE,
+        "algorithm.epochs=1",
+        "total_frames=128",
+        "evaluation.interval=128",
+        "evaluation.episodes=2",
+        "evaluation.mode=best",
+    )
     with caplog.at_level("INFO", logger="warp_torchrl"):
         training.train()
     (told,) = [each.message for each in caplog.records if "of each kind" in each.message]

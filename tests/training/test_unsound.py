@@ -15,6 +15,8 @@ from warp_torchrl.system.finite import NumericalFailure, are_unsound, check_scor
 
 NAN, INF = math.nan, math.inf
 LEARNERS = [*ALGORITHMS, "remembers", "taught", "talks late", "regrets"]
+SAME = ("ippo", "ppo", "vdn", "regrets")
+"""Learners that take in a batch as another one does: ``mappo``, or ``dqn``."""
 BAD = {
     "an observation": [((*OBSERVATION, "status"), NAN), (("next", *OBSERVATION, "status"), INF), ("state", -INF)],
     "a reward": [(("next", *REWARD), NAN)],
@@ -40,7 +42,9 @@ def refused(training, batch, what):
     return told.value
 
 
-@pytest.mark.parametrize("name", LEARNERS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(each, marks=pytest.mark.slow) if each in SAME else each for each in LEARNERS]
+)
 def test_no_learner_takes_in_what_is_not_finite(tmp_path, name):
     training = tiny(tmp_path, *TINIER, *RUNS[name])
     batch = next(training.batches())[0].clone()

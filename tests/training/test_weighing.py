@@ -13,7 +13,9 @@ NAMES = ("one", "two", "large")
 
 
 def test_weights_follow_what_was_saved_before_a_batch(tmp_path):
-    training = tiny(tmp_path, *THREE, "total_frames=256", "mixture.weigh=left", "mixture.worlds=3", "seed=2")
+    training = tiny(
+        tmp_path, *THREE, "algorithm.epochs=1", "total_frames=256", "mixture.weigh=left", "mixture.worlds=3", "seed=2"
+    )
     first = first_world_seed(2)
     baseline = [
         play_heuristics(training.run_config.make_env(3, first, world=kind.world), first, ("coordinated",))

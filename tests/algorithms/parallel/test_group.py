@@ -1,6 +1,7 @@
 """What processes tell each other: two of them, and one alone."""
 
 import multiprocessing
+import sys
 from queue import Empty
 
 import pytest
@@ -51,7 +52,7 @@ def other(rank, end, answers):
 @pytest.fixture(scope="module")
 def said():
     """What this process, which is the first, and another one have said."""
-    context = multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
     answers, ((own,), (given,)) = context.Queue(), pairs(1)
     second = context.Process(target=other, args=(1, given, answers), daemon=True)
     second.start()

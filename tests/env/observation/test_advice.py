@@ -29,7 +29,7 @@ def env_of(scenario, adviser, *overrides, n_worlds=6):
 def test_advice_is_what_the_adviser_would_have_the_agent_do(scenario, adviser):
     env = env_of(scenario, adviser, "landscape.size=16")
     policy, shown, acts = HEURISTICS[adviser](env), env.reset(), set()
-    for _ in range(25):
+    for _ in range(12):
         action = policy(shown.clone())["agents", "action"]
         advised = shown["agents", "observation", "status"][..., -len(Action) :]
         assert torch.equal(advised.argmax(dim=-1), action) and torch.equal(advised.sum(dim=-1), torch.ones(6, 4))

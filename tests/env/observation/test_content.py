@@ -47,7 +47,7 @@ def holds(planes, content):
 def test_a_plane_holds_what_is_told_of_it(world, observation):
     env = WildfireEnv(small_world(**world), observation=observation, n_worlds=4)
     torch.manual_seed(0)
-    seen = env.rollout(12, break_when_any_done=False)
+    seen = env.rollout(8, break_when_any_done=False)
     assert all(holds(seen["state"], env.state_content))
     for name, content in env.contents.items():
         assert not content or all(holds(seen["agents", "observation", name], content))

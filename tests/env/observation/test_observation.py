@@ -54,7 +54,7 @@ def test_what_is_seen_stays_within_its_space_and_reaches_its_bounds(observation)
     steep = Perlin(size=12, relief=900.0)
     world = small_world(landscape=steep, team=Team(n_agents=6, roles=("ugv", "uav")), horizon=60)
     env = WildfireEnv(world, observation=observation, n_worlds=4)
-    seen = env.rollout(120, break_when_any_done=False)["agents", "observation"]
+    seen = env.rollout(60, break_when_any_done=False)["agents", "observation"]
     named = {"": seen} if isinstance(seen, torch.Tensor) else dict(seen.items())
     for name, space in observation.spaces(world).items():
         low, high = space.bounds()

@@ -56,7 +56,7 @@ def test_shaping_adds_minus_the_first_potential_to_the_return(make_small_env, re
         return paid, first
 
     plain, _ = played(0.0, 1.0)
-    for gamma in (0.9, 1.0):
+    for gamma in (0.9, 1.0) if reward is Efficiency else (0.9,):
         shaped, first = played(1.0, gamma)
         gained = sum(gamma**step * (more - each) for step, (more, each) in enumerate(zip(shaped, plain, strict=True)))
         assert torch.allclose(gained, -first, atol=1e-5)

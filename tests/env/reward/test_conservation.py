@@ -170,13 +170,13 @@ def test_adaptive_pays_for_the_downwind_half_and_once():
 @pytest.mark.parametrize("reward", CONSERVATION)
 def test_each_telescopes_to_its_closed_form(make_small_env, reward):
     """The return of random play is R(end) - R(start), less the acts; r_1 of ``adaptive`` is an event, and left out."""
-    options = {"downwind": 0.0} if reward is Adaptive else {"horizon": 60} if reward is Time else {}
+    options = {"downwind": 0.0} if reward is Adaptive else {"horizon": 36} if reward is Time else {}
     component = reward(**options)
-    env = make_small_env(8, small_world(horizon=60, landscape=Perlin(size=12, relief=40.0)), reward=component)
+    env = make_small_env(8, small_world(horizon=36, landscape=Perlin(size=12, relief=40.0)), reward=component)
     torch.manual_seed(0)
     now = env.reset()
     start, total = component.value(env.world_state, env.tree_counts), torch.zeros(8)
-    for _ in range(60):
+    for _ in range(36):
         now = env.step(env.rand_action(now))["next"]
         total += now["agents", "reward"].mean(1)[:, 0]
     assert now["done"].all()
