@@ -165,7 +165,8 @@ def _same_start():
 def weak_run(tmp_path_factory):
     """The folder of a run of two agents that has hardly learned."""
     from warp_torchrl.runs.config.building import run_config
-    from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
+    from warp_torchrl.runs.config.compose import compose_config
+    from warp_torchrl.runs.config.plain_values import plain, without_targets
     from warp_torchrl.runs.config.saved_config import SavedConfig
     from warp_torchrl.training.loop import Training
 

@@ -13,7 +13,7 @@ from warp_torchrl.evaluation.play import play
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import plain
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import restore
 from warp_torchrl.training.loop import Training
 

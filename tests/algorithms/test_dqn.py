@@ -10,8 +10,9 @@ from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.algorithms.sac import Sac
 from warp_torchrl.models import ACTION, ACTION_MASK, ACTION_VALUE, REWARD, Mlp, over_canonical
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 
 SMALL = Mlp(actor_hidden=(8,), critic_hidden=(8,))
 

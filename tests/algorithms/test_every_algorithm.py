@@ -9,7 +9,8 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 from tests.conftest import small_world
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, REWARD, Cnn, Mlp
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, conf_folder, plain
+from warp_torchrl.runs.config.compose import compose_config, conf_folder
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.world.team.team import Team
 
 NAMES = sorted(path.stem for path in (conf_folder() / "algorithm").glob("*.yaml"))

@@ -18,7 +18,8 @@ from warp_torchrl.benchmark.tasks import disagreements
 from warp_torchrl.benchmark.ticks import numpy_copy
 from warp_torchrl.benchmark.timing import mean_rate
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.training.loop import Training
 from warp_torchrl.world.arrays.random import Stream, uniform

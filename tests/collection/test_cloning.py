@@ -11,7 +11,8 @@ from warp_torchrl.demonstrations.files import save_recording
 from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, OBSERVATION
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
+from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.plain_values import plain, without_targets
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.training.loop import Training
 

@@ -12,8 +12,9 @@ from warp_torchrl.algorithms.parallel import WorkerDied
 from warp_torchrl.collection.collectors import InProcess, MultiProcess, Ray
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.runs.config.seeds import first_world_seed
 from warp_torchrl.training.loop import Training

@@ -4,8 +4,9 @@ import pytest
 
 from warp_torchrl.collection.imitation import Imitation
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 
 
 def test_the_weight_falls_linearly_to_nothing():

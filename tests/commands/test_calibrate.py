@@ -12,8 +12,9 @@ from warp_torchrl.commands.failure import DONE, IN_USE, MISTAKE
 from warp_torchrl.prediction.calibration.case import read_fire_case
 from warp_torchrl.prediction.calibration.fitting import Shrinkage
 from warp_torchrl.prediction.calibration.options import CalibrationOptions
-from warp_torchrl.runs.config.compose import option_of, plain
+from warp_torchrl.runs.config.compose import option_of
 from warp_torchrl.runs.config.construction import ConfigError, build
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 from warp_torchrl.system.lock import RunFolderLock
 

@@ -12,9 +12,10 @@ from tests.stress.processes import ROOT
 from warp_torchrl.commands import predict
 from warp_torchrl.commands.command import evaluate, train
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import GROUPS, compose_config, conf_folder, option_names, plain
+from warp_torchrl.runs.config.compose import GROUPS, compose_config, conf_folder, option_names
 from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError, component
 from warp_torchrl.runs.config.defaults import UNKNOWN, defaults
+from warp_torchrl.runs.config.plain_values import plain
 
 MISTAKES = (
     "train total_frame=3",

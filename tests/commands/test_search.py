@@ -15,7 +15,8 @@ from tests.commands.test_command import TINY
 from warp_torchrl.commands import search as search_module
 from warp_torchrl.commands.failure import DISK, DONE, IN_USE, MISTAKE
 from warp_torchrl.commands.search import FIRES, check_points, main
-from warp_torchrl.runs.config.compose import compose_config, conf_folder, plain
+from warp_torchrl.runs.config.compose import compose_config, conf_folder
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.space import divided
 from warp_torchrl.system.lock import RunFolderLock
 

@@ -3,7 +3,8 @@
 import pytest
 
 from warp_torchrl.evaluation.method import method
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig
 
 

@@ -7,8 +7,9 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs.config.components import build_components
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ENVIRONMENT
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import environment_config
 
 SMALL = ("landscape.size=12", "horizon=20")

@@ -13,8 +13,9 @@ from warp_torchrl.demonstrations.recording import MOVER, Mover
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ORIENTATION, ROLE, signature
 from warp_torchrl.models.canonical import Orientation
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 
 
 def found(folder, *overrides):

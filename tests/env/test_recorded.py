@@ -13,7 +13,8 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.recorded import RecordedStep
 from warp_torchrl.env.reward import Time
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.system.device import unread
 
 AT_LENGTH = [

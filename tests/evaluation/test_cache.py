@@ -13,7 +13,8 @@ from warp_torchrl.evaluation import evaluate as evaluation_module
 from warp_torchrl.evaluation.play import play_heuristics
 from warp_torchrl.heuristics import HEURISTICS, NoOp
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.world.terrain.array import Array
 
 TINY = ["evaluation.episodes=3", "landscape.size=12", "horizon=16"]

@@ -8,8 +8,9 @@ import pytest
 from warp_torchrl.evaluation import evaluate as evaluation_module
 from warp_torchrl.evaluation.play import play_heuristics
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 
 TINY = ["landscape.size=12", "horizon=16", "evaluation.episodes=3", "evaluation.cache=false"]
 

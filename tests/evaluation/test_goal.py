@@ -7,8 +7,9 @@ import pytest
 from tests.conftest import small_world
 from warp_torchrl.evaluation.goal import better_of, goal
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.world.mechanics.mechanic import Mechanic, Metric
 from warp_torchrl.world.team.team import Team
 

@@ -10,7 +10,8 @@ from warp_torchrl.evaluation.maps import maps_line, play_maps, write_maps
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.heuristics import Coordinated, Dispatch, NoOp
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.world.terrain.fixed import Fixed
 
 TINY = ["landscape.size=12", "horizon=24", "evaluation.first_seed=2000000"]

@@ -9,8 +9,9 @@ import pytest
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, option_of, plain, without_targets
+from warp_torchrl.runs.config.compose import compose_config, option_of
 from warp_torchrl.runs.config.construction import COMPONENTS
+from warp_torchrl.runs.config.plain_values import plain, without_targets
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.runs.manifest import read_manifest, write_manifest
 from warp_torchrl.runs.policies.find import find_policy

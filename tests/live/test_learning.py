@@ -12,7 +12,8 @@ from warp_torchrl.live.learning import PageTraining, _literal, arguments
 from warp_torchrl.live.match import Match
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 from warp_torchrl.runs.policies.named_policy import NamedPolicy
 from warp_torchrl.runs.transfer import check_start

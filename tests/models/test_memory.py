@@ -28,8 +28,9 @@ from warp_torchrl.models import (
     signature,
 )
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.policies.trained import TrainedPolicy
 from warp_torchrl.world.team.team import Team
 

@@ -21,8 +21,9 @@ from warp_torchrl.models import ACTION, LOGITS, OBSERVATION, RADIO, SENT, Cnn, M
 from warp_torchrl.models.messages import Round
 from warp_torchrl.models.signature import canonical_key
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 from warp_torchrl.world.team.team import Team
 

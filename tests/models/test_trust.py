@@ -13,8 +13,9 @@ from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, LOGITS, Mlp, over_canonical, signature
 from warp_torchrl.models.trust import Trust
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 
 ADVISED = ("observation.advice=coordinated", "observation.rules=true")
 SMALL = {"actor_hidden": (16,), "critic_hidden": (8,), "dtype": "float32"}

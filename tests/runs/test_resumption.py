@@ -5,8 +5,9 @@ import yaml
 
 from tests.runs.test_checkpoint import SIGNATURE
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain, without_targets
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.runs.resumption import _other_classes, edits, read_config, resumption
 

@@ -15,8 +15,9 @@ from warp_torchrl.evaluation.method import method
 from warp_torchrl.heuristics import HEURISTICS, TEACHERS
 from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION, over_canonical
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.training.kickstarting import _KickstartingLoss, kickstart
 from warp_torchrl.training.loop import Training

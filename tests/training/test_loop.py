@@ -20,7 +20,8 @@ from warp_torchrl.models import ACTION
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, conf_folder, plain, without_targets
+from warp_torchrl.runs.config.compose import compose_config, conf_folder
+from warp_torchrl.runs.config.plain_values import plain, without_targets
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.runs.export import export
 from warp_torchrl.runs.policies.load import policy_of

@@ -6,8 +6,9 @@ from torch.fx.experimental.proxy_tensor import make_fx
 
 from tests.training.test_waits import training
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.system.device import unread
 from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.recorded import RecordedUpdate

@@ -9,7 +9,8 @@ from tests.training.test_loop import TINY, rows, tiny
 from tests.world.mechanics.there import needs
 from warp_torchrl.models import REWARD, differing, joint, signature
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.seeds import first_world_seed
 
 THREE = [

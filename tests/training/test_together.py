@@ -21,8 +21,9 @@ from warp_torchrl.commands.command import train as train_here
 from warp_torchrl.demonstrations.files import save_recording
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 
 LENGTH = ("processes=2", "total_frames=256", "checkpoint.interval=64", "checkpoint.keep=9")
 

@@ -5,7 +5,8 @@ import torch
 
 from warp_torchrl.benchmark.waits import counted_waits
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.system.device import unread
 from warp_torchrl.training.loop import Training

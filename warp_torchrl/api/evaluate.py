@@ -12,9 +12,10 @@ from warp_torchrl.evaluation.evaluate import check_policy, evaluate_policy
 from warp_torchrl.evaluation.result import Result
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.grammar import listed_plugins
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.plugins import Plugin, load
 from warp_torchrl.runs.config.saved_config import restore, world_overrides
 from warp_torchrl.runs.destination import check_free

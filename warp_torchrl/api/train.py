@@ -8,9 +8,10 @@ from typing import Any
 
 from warp_torchrl.api.keywords import as_overrides, check_list
 from warp_torchrl.runs.config.building import BuildOnce
-from warp_torchrl.runs.config.compose import choices, compose_config, plain
+from warp_torchrl.runs.config.compose import choices, compose_config
 from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError
 from warp_torchrl.runs.config.grammar import listed_plugins
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.plugins import Plugin, load
 from warp_torchrl.system.modes import apart
 from warp_torchrl.training.callbacks import Callbacks

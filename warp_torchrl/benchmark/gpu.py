@@ -23,7 +23,8 @@ from warp_torchrl.benchmark.machine import machine, peak_memory
 from warp_torchrl.benchmark.timing import clock, spread, take_turns
 from warp_torchrl.benchmark.waits import counted_waits
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.system import disk
 from warp_torchrl.system.device import unread

@@ -16,7 +16,8 @@ from warp_torchrl.algorithms import parallel
 from warp_torchrl.benchmark.tables import entry, spread_of, table
 from warp_torchrl.benchmark.timing import spread
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.training.following import FOLLOWING
 from warp_torchrl.training.loop import Training

@@ -11,7 +11,8 @@ from warp_torchrl.benchmark.shares import training_shares
 from warp_torchrl.benchmark.stable_baselines import NAME, open_stable_baselines, reason_against
 from warp_torchrl.benchmark.timing import spread, take_turns
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.training.following import FOLLOWING
 from warp_torchrl.training.loop import Training

@@ -25,9 +25,10 @@ from warp_torchrl.prediction.calibration.options import CalibrationOptions
 from warp_torchrl.prediction.calibration.parameters import Parameter, fire_at, parameters_of
 from warp_torchrl.prediction.calibration.report import ScoreLog, as_numbers, law_yaml, means, scores_table
 from warp_torchrl.prediction.scores.scar import Scores
-from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError, build, construct
 from warp_torchrl.runs.config.grammar import check_flags
+from warp_torchrl.runs.config.plain_values import plain, without_targets
 from warp_torchrl.runs.output import output_folder
 from warp_torchrl.system import disk
 from warp_torchrl.system.provenance import Provenance, gathered, report_file, section

@@ -16,8 +16,9 @@ from warp_torchrl.commands.failure import fail
 from warp_torchrl.commands.sweep import jobs
 from warp_torchrl.evaluation.checks import check_evaluation
 from warp_torchrl.runs.config.building import BuildOnce
-from warp_torchrl.runs.config.compose import HYDRA_ERRORS, check_choices, explain, plain, tidied
+from warp_torchrl.runs.config.compose import HYDRA_ERRORS, check_choices, explain, tidied
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.destination import check_free
 from warp_torchrl.training.checks import check_training
 from warp_torchrl.validation import did_you_mean

@@ -25,16 +25,10 @@ from warp_torchrl.evaluation.checks import map_fires, of_worlds, picture_kind, w
 from warp_torchrl.evaluation.evaluate import announce, evaluate_policy
 from warp_torchrl.evaluation.result import Result
 from warp_torchrl.runs.config.building import BuildOnce
-from warp_torchrl.runs.config.compose import (
-    HYDRA_ERRORS,
-    conf_folder,
-    explain,
-    option_of,
-    plain,
-    tidied,
-)
+from warp_torchrl.runs.config.compose import HYDRA_ERRORS, conf_folder, explain, option_of, tidied
 from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError
 from warp_torchrl.runs.config.grammar import check_flags, check_overrides, flags_first, listed_plugins
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.plugins import load, registered
 from warp_torchrl.runs.config.saved_config import restore, world_overrides
 from warp_torchrl.runs.destination import check_free

@@ -11,11 +11,12 @@ from dataclasses import fields
 from importlib.metadata import entry_points
 from typing import Any, NoReturn
 
-from warp_torchrl.runs.config.compose import check_choices, composed, plain, without_libraries
+from warp_torchrl.runs.config.compose import check_choices, composed, without_libraries
 from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError, chosen, component, construct
 from warp_torchrl.runs.config.defaults import UNKNOWN
 from warp_torchrl.runs.config.files import PREDICTION
 from warp_torchrl.runs.config.grammar import check_overrides
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.plugins import ENTRY_POINTS
 from warp_torchrl.runs.config.prediction import compose_prediction
 from warp_torchrl.system.excerpt import OutOfReachError, excerpt, is_stand_in

@@ -38,9 +38,9 @@ from warp_torchrl.prediction.observed.report import (
 from warp_torchrl.prediction.observed.scene import Scene
 from warp_torchrl.prediction.predict import Prediction, lasting, predict
 from warp_torchrl.prediction.report import page, report_numbers, warnings
-from warp_torchrl.runs.config.compose import without_targets
 from warp_torchrl.runs.config.construction import ConfigError, build, construct
 from warp_torchrl.runs.config.options import PredictionOptions
+from warp_torchrl.runs.config.plain_values import without_targets
 from warp_torchrl.runs.config.prediction import compose_prediction
 from warp_torchrl.runs.output import output_folder
 from warp_torchrl.system import disk, memory

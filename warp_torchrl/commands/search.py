@@ -19,10 +19,11 @@ from warp_torchrl.commands.program import command_help, run_program
 from warp_torchrl.evaluation.goal import goal
 from warp_torchrl.runs.checkpoint import holds_any
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import GROUPS, compose_config, conf_folder, plain, without_targets
+from warp_torchrl.runs.config.compose import GROUPS, compose_config, conf_folder
 from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError, UnknownKeyError, construct
 from warp_torchrl.runs.config.grammar import check_flags, check_overrides
 from warp_torchrl.runs.config.options import SearchOptions
+from warp_torchrl.runs.config.plain_values import plain, without_targets
 from warp_torchrl.runs.config.space import Dimension, Value, divided
 from warp_torchrl.runs.destination import check_free
 from warp_torchrl.runs.process import SearchEnded, TrainingProcess

@@ -6,9 +6,10 @@ from dataclasses import MISSING, fields
 from typing import Any
 
 from warp_torchrl.commands.program import run_program, tell
-from warp_torchrl.runs.config.compose import compose_config, conf_folder, option_names, plain
+from warp_torchrl.runs.config.compose import compose_config, conf_folder, option_names
 from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError, component
 from warp_torchrl.runs.config.key_help import first_paragraph, key_help
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.validation import did_you_mean
 from warp_torchrl.world.mechanics.table import mechanics

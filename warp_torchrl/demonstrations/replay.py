@@ -11,8 +11,8 @@ from warp_torchrl.demonstrations.recording import Recording
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, REWARD, ROLE
 from warp_torchrl.runs.config.components import build_components
-from warp_torchrl.runs.config.compose import plain
 from warp_torchrl.runs.config.construction import ENVIRONMENT
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import restore
 from warp_torchrl.system.checksummed import Unsound
 from warp_torchrl.world.state.state import WorldState

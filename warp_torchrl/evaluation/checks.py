@@ -8,8 +8,8 @@ from warp_torchrl.evaluation.evaluate import check_policy
 from warp_torchrl.evaluation.picture import PictureKind
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.config.compose import plain
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.config.saved_config import restore
 from warp_torchrl.runs.config.seeds import BEYOND_EVALUATION

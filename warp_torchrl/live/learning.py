@@ -13,8 +13,9 @@ from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.match import Setting
 from warp_torchrl.live.side import Side
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import WORLD_KEYS
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 from warp_torchrl.runs.process import STOPPED, StartedTraining, TrainingProcess
 from warp_torchrl.validation import dotted

@@ -17,8 +17,8 @@ from warp_torchrl.live.order import Order
 from warp_torchrl.live.player import Player
 from warp_torchrl.live.side import Side
 from warp_torchrl.runs.config.components import build_components
-from warp_torchrl.runs.config.compose import plain
 from warp_torchrl.runs.config.construction import ENVIRONMENT
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import restore
 from warp_torchrl.system.checksummed import Unsound
 

@@ -7,8 +7,9 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import build
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.system.modes import apart
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.air.wind import Wind, constant_wind

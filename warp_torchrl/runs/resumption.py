@@ -10,8 +10,8 @@ import yaml
 
 from warp_torchrl.runs.checkpoint import Checkpoint, newest
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import plain
 from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 from warp_torchrl.runs.destination import LARGEST_EVALUATION

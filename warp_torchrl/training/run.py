@@ -14,8 +14,8 @@ from warp_torchrl.evaluation.evaluate import evaluate_policy
 from warp_torchrl.evaluation.result import Result
 from warp_torchrl.evaluation.runs.folders import read_metrics
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.config.compose import as_yaml, plain, without_targets
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import as_yaml, plain, without_targets
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore, world_overrides
 from warp_torchrl.runs.policies.find import find_policy
 from warp_torchrl.runs.policies.load import load_policy

@@ -14,8 +14,8 @@ from warp_torchrl.heuristics.heuristic import seeing_all
 from warp_torchrl.models import ACTION_MASK, AGENCY, OBSERVATION, ROLE, recurrent_actors
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import Checkpoint
-from warp_torchrl.runs.config.compose import plain
 from warp_torchrl.runs.config.construction import ConfigError, build
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import restore
 from warp_torchrl.runs.policies.find import find_policy
 from warp_torchrl.runs.policies.named_policy import fitted_policy

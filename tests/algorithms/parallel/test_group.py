@@ -1,7 +1,6 @@
 """What processes tell each other: two of them, and one alone."""
 
 import multiprocessing
-import sys
 from queue import Empty
 
 import pytest
@@ -52,7 +51,7 @@ def other(rank, end, answers):
 @pytest.fixture(scope="module")
 def said():
     """What this process, which is the first, and another one have said."""
-    context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
+    context = multiprocessing.get_context("spawn")
     answers, ((own,), (given,)) = context.Queue(), pairs(1)
     second = context.Process(target=other, args=(1, given, answers), daemon=True)
     second.start()

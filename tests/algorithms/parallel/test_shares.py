@@ -7,7 +7,8 @@ from tests.demonstrations.played import played
 from warp_torchrl.algorithms.parallel import group
 from warp_torchrl.demonstrations.files import save_recording
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.training.learning import Learning
 
 SMALL = ("scenario=skirmish", "n_worlds=4", "collector.steps=8", "collector.grows_at=0", "horizon=16", "processes=2")

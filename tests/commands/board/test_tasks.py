@@ -5,8 +5,9 @@ import pytest
 from tests.world.mechanics.there import needs
 from warp_torchrl.commands.board.tasks import Task, boards, read_board, rules_of, world_of
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED
 from warp_torchrl.world.law.hazard import HazardFire
 from warp_torchrl.world.world import World

@@ -10,8 +10,9 @@ from optuna.trial import TrialState, create_trial
 
 from warp_torchrl.commands.hyperparameters.figure import SEARCH_FIGURE, draw_search
 from warp_torchrl.commands.hyperparameters.report import BEST, CSV, TABLE, experiment, trials_table, write
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.options import SearchOptions
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.space import dimension
 from warp_torchrl.world.mechanics.mechanic import Metric
 

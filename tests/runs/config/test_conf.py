@@ -15,9 +15,10 @@ from tests.conftest import OF_DOCS
 from tests.world.mechanics.there import can_play, needs
 from warp_torchrl.api.make import make_env
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, conf_folder, plain, without_targets
+from warp_torchrl.runs.config.compose import compose_config, conf_folder
 from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError, build, component
 from warp_torchrl.runs.config.defaults import defaults
+from warp_torchrl.runs.config.plain_values import plain, without_targets
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.config.saved_config import SavedConfig, read_saved_config, restore, world_overrides
 from warp_torchrl.world.air.gridded import Gridded

@@ -25,8 +25,9 @@ from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config import construction, plugins
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, conf_folder, option_names, plain, without_targets
+from warp_torchrl.runs.config.compose import compose_config, conf_folder, option_names
 from warp_torchrl.runs.config.construction import ENVIRONMENT, WORLD_KEYS, ConfigError, build
+from warp_torchrl.runs.config.plain_values import plain, without_targets
 from warp_torchrl.runs.config.prediction import compose_prediction
 from warp_torchrl.runs.config.saved_config import SavedConfig, environment_config, restore, world_overrides
 from warp_torchrl.training.loop import Training

@@ -6,8 +6,9 @@ import pytest
 
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.runs.config.seeds import (
     BEYOND_EVALUATION,

@@ -4,8 +4,9 @@ import pytest
 
 from tests.world.mechanics.there import needs
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 from warp_torchrl.world.air.wind import Wandering
 

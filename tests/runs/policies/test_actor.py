@@ -8,7 +8,8 @@ from warp_torchrl.models import ACTION, ACTION_MASK, AGENCY, RADIO, ROLE, SENT, 
 from warp_torchrl.models.signature import observation_key
 from warp_torchrl.runs.checkpoint import CheckpointError
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.policies.actor import Actor
 from warp_torchrl.runs.policies.trained import TrainedPolicy, scores
 

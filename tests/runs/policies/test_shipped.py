@@ -11,7 +11,8 @@ from warp_torchrl import load_policy, make_env
 from warp_torchrl.evaluation.play import play, play_heuristics
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
+from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.plain_values import plain, without_targets
 from warp_torchrl.runs.config.saved_config import restore
 from warp_torchrl.runs.export import export
 from warp_torchrl.runs.policies.find import find_policy

@@ -3,8 +3,9 @@
 import pytest
 import torch
 
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError, build
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.world.state.state import Landscape
 
 LEVEL = torch.zeros(1, 1, 1, dtype=torch.uint8)

@@ -25,8 +25,9 @@ from tests.world.rasters import (
     write_enormous,
 )
 from warp_torchrl.commands.command import train
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import build
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.world.state.cells import holds_trees
 from warp_torchrl.world.state.state import Cover
 from warp_torchrl.world.terrain.landscape import draw_age

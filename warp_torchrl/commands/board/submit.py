@@ -20,9 +20,9 @@ from warp_torchrl.evaluation.cache import code_digest
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs.checkpoint import Checkpoint
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import plain
 from warp_torchrl.runs.config.construction import ConfigError, construct
 from warp_torchrl.runs.config.grammar import own_values
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.history import history_line, trained_minutes, trained_steps
 from warp_torchrl.runs.policies.find import find_policy
 from warp_torchrl.system.shipped import policy_names

@@ -8,8 +8,9 @@ from hashlib import sha256
 from typing import Any
 
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, conf_folder, plain
+from warp_torchrl.runs.config.compose import compose_config, conf_folder
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.system.foreign_yaml import read_yaml
 from warp_torchrl.validation import check_fields, did_you_mean
 from warp_torchrl.world.world import World

@@ -16,9 +16,10 @@ from optuna.trial import FrozenTrial, TrialState
 from warp_torchrl.commands.hyperparameters.search import TRIALS, best_of
 from warp_torchrl.evaluation.goal import SAVED
 from warp_torchrl.evaluation.units import headed, sign_of, told, written
-from warp_torchrl.runs.config.compose import GROUPS, choices, compose_config, plain
+from warp_torchrl.runs.config.compose import GROUPS, choices, compose_config
 from warp_torchrl.runs.config.construction import COMPONENTS
 from warp_torchrl.runs.config.options import SearchOptions
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.space import Dimension, value_of
 from warp_torchrl.system import disk
 from warp_torchrl.world.mechanics.mechanic import Metric

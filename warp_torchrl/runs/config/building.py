@@ -10,7 +10,7 @@ from typing import Any
 from warp_torchrl.collection.imitation import Imitation, check_teacher
 from warp_torchrl.collection.mixture import Kind, Mixture
 from warp_torchrl.runs.config.components import build_components
-from warp_torchrl.runs.config.compose import OPTION, compose_config, option_names, plain
+from warp_torchrl.runs.config.compose import OPTION, compose_config, option_names
 from warp_torchrl.runs.config.construction import (
     COMMAND_KEYS,
     COMPONENTS,
@@ -21,6 +21,7 @@ from warp_torchrl.runs.config.construction import (
     construct,
 )
 from warp_torchrl.runs.config.options import CheckpointConfig, EvaluationConfig
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.config.worlds import KindOfWorld, level_worlds
 from warp_torchrl.validation import did_you_mean, dotted

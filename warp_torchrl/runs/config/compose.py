@@ -6,7 +6,7 @@ this package's own or of a plug-in's; nothing that is read from a run folder is 
 
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import fields
@@ -32,6 +32,7 @@ from warp_torchrl.runs.config.construction import (
 from warp_torchrl.runs.config.defaults import defaults
 from warp_torchrl.runs.config.files import FileConfigSource
 from warp_torchrl.runs.config.grammar import check_overrides, several_values
+from warp_torchrl.runs.config.plain_values import keys_of, plain
 from warp_torchrl.runs.config.plugins import changes, conf_folders, needed, registered
 from warp_torchrl.runs.config.plugins import conf_folder as conf_folder
 from warp_torchrl.validation import did_you_mean
@@ -154,7 +155,7 @@ def _known_keys(name: str, overrides: Sequence[str]) -> list[str]:
             config = _composed(conf_folder(), _last_change(conf_folder()), name, choices)
         except HYDRA_ERRORS:
             continue
-        return [*_keys(plain(config)), *GROUPS]
+        return [*keys_of(plain(config)), *GROUPS]
     return []
 
 
@@ -278,29 +279,3 @@ def option_of(group: str, target: str) -> str:
     raise ConfigError(
         f"{group}._target_ must be a class that an option of conf/{group} names, or one of a plug-in, got {target}"
     )
-
-
-def plain(config: DictConfig) -> dict[str, Any]:
-    """Return a configuration as plain, resolved values."""
-    return cast("dict[str, Any]", OmegaConf.to_container(config, resolve=True))
-
-
-def as_yaml(config: DictConfig) -> str:
-    """Return a configuration as the text of a yaml file, with resolved values."""
-    return OmegaConf.to_yaml(config, resolve=True)
-
-
-def without_targets(node: Any) -> Any:
-    """Return a configuration node without its ``_target_`` entries."""
-    if isinstance(node, Mapping):
-        return {key: without_targets(value) for key, value in node.items() if key != "_target_"}
-    return list(node) if isinstance(node, list) else node
-
-
-def _keys(node: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
-    """Yield the keys of a configuration, those of groups included."""
-    for key, value in node.items():
-        if key != "_target_":
-            yield f"{prefix}{key}"
-        if isinstance(value, Mapping):
-            yield from _keys(value, f"{prefix}{key}.")

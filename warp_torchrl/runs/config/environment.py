@@ -4,8 +4,9 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ENVIRONMENT, WORLD_KEYS
+from warp_torchrl.runs.config.plain_values import plain
 
 
 def compose_environment(overrides: Sequence[str]) -> dict[str, Any]:

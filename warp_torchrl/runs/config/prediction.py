@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.grammar import check_flags
+from warp_torchrl.runs.config.plain_values import plain
 
 
 def compose_prediction(overrides: Sequence[str]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from warp_torchrl.runs.config.compose import OPTION, compose_config, option_names, option_of, plain, without_targets
+from warp_torchrl.runs.config.compose import OPTION, compose_config, option_names, option_of
 from warp_torchrl.runs.config.construction import (
     COMPONENTS,
     ENVIRONMENT,
@@ -19,6 +19,7 @@ from warp_torchrl.runs.config.construction import (
     component,
     free_mappings,
 )
+from warp_torchrl.runs.config.plain_values import plain, without_targets
 from warp_torchrl.runs.config.plugins import check_loaded
 from warp_torchrl.validation import dotted
 

@@ -9,8 +9,9 @@ from warp_torchrl.models import Entry
 from warp_torchrl.models.trust import Trust
 from warp_torchrl.runs.checkpoint import Checkpoint
 from warp_torchrl.runs.config.components import build_components
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ENVIRONMENT
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.history import trained_steps
 from warp_torchrl.runs.policies.actor import Actor
 from warp_torchrl.world.state.role import ROLES

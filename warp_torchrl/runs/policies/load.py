@@ -9,8 +9,8 @@ import torch
 from warp_torchrl.env.observation import OF_CRITIC
 from warp_torchrl.models import RADIO
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.config.compose import plain
 from warp_torchrl.runs.config.construction import build
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.plugins import Plugin, load
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 from warp_torchrl.runs.policies.find import find_policy

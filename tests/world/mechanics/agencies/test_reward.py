@@ -11,8 +11,9 @@ from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.reward import Agency
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.world.mechanics.agencies.agencies import Lands, SeveralAgencies, lands_of
 from warp_torchrl.world.state.worth import sums_by
 

@@ -11,8 +11,9 @@ from warp_torchrl import load_policy, make_env
 from warp_torchrl.env.metrics import metrics
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import environment_config, restore, world_overrides
 from warp_torchrl.world.mechanics.flight.flight import Aircraft, Flight
 from warp_torchrl.world.state.cells import count_trees
