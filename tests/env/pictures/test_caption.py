@@ -3,6 +3,7 @@
 from tests.conftest import small_world
 from tests.env.pictures.worlds import drawn
 from warp_torchrl.env.pictures.caption import progress
+from warp_torchrl.world.arrays.batch import concatenated
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.mechanics.mechanic import Mechanic
 
@@ -18,7 +19,7 @@ class Loud(Mechanic):
 
 
 def test_the_forest_is_counted_where_no_mechanic_says_more():
-    state = drawn([[5, 5, 11, 5]])  # of four trees one burns
+    state = concatenated([drawn([[5, 5, 11, 5]]), drawn([[5, 5, 5, 5]])])  # of four trees one burns in the first
     assert progress(state, small_world()) == "step 0 of 40:  75% saved, 25% burning"
     assert progress(state, small_world(mechanics=(Loud(),))) == "step 0 of 40:  4 cells, loud"
 
