@@ -216,6 +216,7 @@ def test_adapters_are_views_that_nothing_needs():
             {
                 *(
                     "runs/config/compose",
+                    "runs/config/plain_values",
                     "runs/config/defaults",
                     "runs/config/files",
                     "runs/config/grammar",
