@@ -44,6 +44,13 @@ def test_a_tree_with_k_burning_neighbours_of_four_ignites_by_1_minus_the_chance_
     assert LAW.ignition_probability(state)[0, 1, 1].item() == pytest.approx(1.0 - (1.0 - ALPHA) ** k, abs=1e-6)
 
 
+def test_lightning_joins_the_chance_of_neighbours():
+    # Trees of age 10 on nine cells: 0.9 / 9 = 0.1 by themselves.
+    law = LatticeFire(beta=0.9)
+    chance = law.ignition_probability(draw("TaT TTT TTT", fire=law))[0]
+    assert chance[1, 1].item() == pytest.approx(0.1 + 0.9 * ALPHA) and chance[2, 0].item() == pytest.approx(0.1)
+
+
 @pytest.mark.parametrize(("drawing", "k"), [("TaT TTT TTT", 1), ("TaT aTa TTT", 3)])
 def test_trees_ignite_as_often_as_that(drawing, k):
     after = ticked(draw(drawing, fire=LAW, worlds=MANY))
