@@ -72,7 +72,7 @@ def test_what_is_not_there_gets_one_line(ask, told: str) -> None:
     assert issubclass(ConfigError, ValueError)
 
 
-@needs("embers", "radio")
+@needs("embers", "lines", "radio")
 def test_the_mixture_of_the_board_has_worlds_of_its_tasks() -> None:
     kinds = run_config(plain(compose_config("train", ["scenario=default", "mixture=warp_v1"]))).kinds
     tasks = read_board("warp-v1").tasks
