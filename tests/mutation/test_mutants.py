@@ -8,6 +8,7 @@ import pytest
 from tests.mutation import __main__ as command
 from tests.mutation.mutants import HERE, ROOT, Mutant, accepted, beside, drawn, places, plan, sample
 from tests.mutation.runner import KILLED, SURVIVED, TOO_LONG, Run, run, verdict
+from tests.world.mechanics.there import needs
 
 MODULE = "warp_torchrl/world/law/law.py"
 
@@ -20,6 +21,7 @@ def test_every_accepted_mutant_stands_in_the_code_with_a_reason():
         assert each["before"] in lines and each["before"] != each["after"] and len(each["reason"]) > 10, each
 
 
+@needs("agencies", "retardant", "sensing")
 def test_the_plan_names_what_there_is():
     settings = plan()
     for pattern in settings["subjects"].values():

@@ -14,7 +14,7 @@ from warp_torchrl.runs.policies.trained import TrainedPolicy
 from warp_torchrl.system.finite import NumericalFailure, are_unsound, check_scores
 
 NAN, INF = math.nan, math.inf
-LEARNERS = [*ALGORITHMS, "remembers", "taught", "talks late", "regrets"]
+LEARNERS = [each for each in (*ALGORITHMS, "remembers", "taught", "talks late", "regrets") if each in RUNS]
 SAME = ("ippo", "ppo", "vdn", "regrets")
 """Learners that take in a batch as another one does: ``mappo``, or ``dqn``."""
 BAD = {

@@ -169,6 +169,7 @@ def test_the_way_to_search_is_that_of_heuristics_and_none_where_all_is_seen():
     assert moved > 20 and agreed > 0.8 * moved
 
 
+@needs("belief")
 def test_ways_are_chosen_by_name_and_stay_beside_further_features():
     def names(*overrides):
         return make_env("skirmish", n_worlds=1, overrides=[*overrides]).channel_names["status"]
