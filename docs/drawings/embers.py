@@ -9,7 +9,7 @@ from warp_torchrl.env.pictures.drawing import BLUE, CELL, VERMILION, ramp, sheet
 from warp_torchrl.world.arrays.random import Stream, named_key, uniform, world_key
 from warp_torchrl.world.behaviour.firebrands import FLIGHT, Firebrands, Plume, landing
 from warp_torchrl.world.fires.alone import Fires
-from warp_torchrl.world.fires.on_map import on_map
+from warp_torchrl.world.fires.arrival_minutes import on_map
 from warp_torchrl.world.fires.spell import Spell
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER

@@ -13,7 +13,7 @@ from warp_torchrl.prediction.simulation import fire_history
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.air.wind import Uniform
 from warp_torchrl.world.arrays.random import world_key
-from warp_torchrl.world.fires.on_map import arrival_minutes
+from warp_torchrl.world.fires.arrival_minutes import arrival_minutes
 from warp_torchrl.world.fires.spell import Spell, spells_of, spread_in
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire

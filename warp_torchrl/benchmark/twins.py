@@ -16,8 +16,8 @@ from warp_torchrl.prediction.observed.scene import Scene
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.arrays.random import log_deviation, world_key
 from warp_torchrl.world.ensemble.parameters import PARAMETERS, Deviations
+from warp_torchrl.world.fires.arrival_minutes import on_map
 from warp_torchrl.world.fires.members import Members
-from warp_torchrl.world.fires.on_map import on_map
 from warp_torchrl.world.fires.sectors import STOPPED
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state.state import Landscape

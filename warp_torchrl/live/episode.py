@@ -84,11 +84,8 @@ def map_colours(side: Shown) -> dict[str, Sequence[int]]:
     absent = {cover.name.lower() for cover in Cover} - {
         Cover(each).name.lower() for each in side.state.cover.unique().tolist()
     }
-    colours: Mapping[str, Sequence[int]] = {
-        name: colour
-        for name, colour in legend_colours(side.env.world.buildings(side.state)).items()
-        if name not in absent
-    }
+    drawn = legend_colours(side.env.world.buildings(side.state) is not None)
+    colours: Mapping[str, Sequence[int]] = {name: colour for name, colour in drawn.items() if name not in absent}
     names = side.env.agent_names
     vehicles = zip(labels(names), vehicle_colours(names).items())
     return {**colours, **{f"{short}  {name}": colour for short, (name, colour) in vehicles}}

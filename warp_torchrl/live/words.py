@@ -164,7 +164,7 @@ def numbers_html(numbers: Mapping[str, float]) -> str:
 def legend(side: Side) -> str:
     """Return the meaning of the colours, and the colour of each vehicle, as HTML."""
     veil = veil_colours() if can_believe(side.env.world) else {}
-    drawn = legend_colours(side.env.world.buildings(side.state))
+    drawn = legend_colours(side.env.world.buildings(side.state) is not None)
     spans = chips({**drawn, **veil, **vehicle_colours(side.env.agent_names)})
     return f"<div style='{_STYLE};padding:2px 12px'>{spans}</div>"
 

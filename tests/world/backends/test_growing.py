@@ -13,7 +13,7 @@ from warp_torchrl.world.backends.spreading import Spreading
 from warp_torchrl.world.fires import alone
 from warp_torchrl.world.fires import parts as parts_module
 from warp_torchrl.world.fires.alone import Fires
-from warp_torchrl.world.fires.on_map import arrival_minutes, on_map
+from warp_torchrl.world.fires.arrival_minutes import arrival_minutes, on_map
 from warp_torchrl.world.fires.spell import Spell
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER

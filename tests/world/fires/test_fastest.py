@@ -10,8 +10,8 @@ from warp_torchrl.world.air.sunlight import Sunlight
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.fires import fastest
 from warp_torchrl.world.fires.alone import Fires
+from warp_torchrl.world.fires.arrival_minutes import on_map
 from warp_torchrl.world.fires.fastest import RowsOfMap
-from warp_torchrl.world.fires.on_map import on_map
 from warp_torchrl.world.fires.spell import Spell, spread_in
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state import window

@@ -11,8 +11,8 @@ from warp_torchrl.world.behaviour.moistures import MOISTURES, moisture_row
 from warp_torchrl.world.ensemble.parameters import Deviations
 from warp_torchrl.world.fires import alone
 from warp_torchrl.world.fires import members as members_module
+from warp_torchrl.world.fires.arrival_minutes import on_map
 from warp_torchrl.world.fires.members import Members
-from warp_torchrl.world.fires.on_map import on_map
 from warp_torchrl.world.fires.sectors import SECTORS
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER

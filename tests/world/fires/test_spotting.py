@@ -10,7 +10,7 @@ from warp_torchrl.prediction.predict import predict
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.behaviour.firebrands import Firebrands
 from warp_torchrl.world.fires.alone import Fires
-from warp_torchrl.world.fires.on_map import on_map
+from warp_torchrl.world.fires.arrival_minutes import on_map
 from warp_torchrl.world.fires.spell import Spell
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER

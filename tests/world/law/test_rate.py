@@ -10,7 +10,7 @@ from tests.world.drawing import draw, drawn
 from warp_torchrl.world.air.wind import Calm, Uniform
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.backends.tick import advance, in_wind
-from warp_torchrl.world.fires.on_map import arrival_minutes
+from warp_torchrl.world.fires.arrival_minutes import arrival_minutes
 from warp_torchrl.world.fires.spell import Spell, spread_in
 from warp_torchrl.world.law import arrivals
 from warp_torchrl.world.law.arrivals import arrivals_in

@@ -9,7 +9,7 @@ import torch
 from tests.world.backends.test_growing import land, lit, turning
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.fires.alone import Fires
-from warp_torchrl.world.fires.on_map import on_map
+from warp_torchrl.world.fires.arrival_minutes import on_map
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER
 

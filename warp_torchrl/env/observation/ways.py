@@ -30,8 +30,8 @@ _NEAR = 8.0
 """Moves at which a place is e times less near [cells]."""
 
 
-WAYS = ("fire", "share", "search")
-"""Names of ways, of which an observation chooses."""
+WAYS: list[str] = []
+"""Names of the ways below, of which an observation chooses."""
 
 
 def check_ways(names: Sequence[str]) -> None:
@@ -47,7 +47,8 @@ def check_ways(names: Sequence[str]) -> None:
 
 
 def _way(name: str) -> Callable[[Function], Function]:
-    """Return what adds the numbers of a way to ``status``, where an observation chooses it."""
+    """Return what adds the numbers of a way to ``status``, where an observation chooses it by its name."""
+    WAYS.append(name)
     parts = Part("vector", (f"{name}_east", f"{name}_north")), Part("scalar", (f"{name}_near",))
     return number(parts, lambda world, choice: name in choice.ways)
 

@@ -30,11 +30,11 @@ def fire_colours() -> Tensor:
     return torch.tensor(FIRE, dtype=torch.uint8)
 
 
-def legend_colours(buildings: Tensor | None = None) -> dict[str, tuple[int, int, int]]:
-    """Return a colour of each item that is drawn on a map, by its name; of buildings where there are some."""
+def legend_colours(has_buildings: bool = False) -> dict[str, tuple[int, int, int]]:
+    """Return a colour of each item that is drawn on a map, by its name."""
     covers = {cover.name.lower(): GROUND[cover][-1] for cover in Cover}
     drawn = {**covers, "fire": FIRE[2], "ember": FIRE[4], "ash": ASH, "firebreak": FIREBREAK, "wet": WATER}
-    return drawn if buildings is None else {**drawn, "house": HOUSE, "house, lost": LOST}
+    return {**drawn, "house": HOUSE, "house, lost": LOST} if has_buildings else drawn
 
 
 @kept(8)

@@ -9,7 +9,7 @@ from torch import Tensor
 from warp_torchrl.prediction.calibration.case import FireCase
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.fires.alone import Fires
-from warp_torchrl.world.fires.on_map import on_map
+from warp_torchrl.world.fires.arrival_minutes import on_map
 from warp_torchrl.world.fires.spell import can_ignite
 from warp_torchrl.world.law.rate import RateFire
 

@@ -15,7 +15,7 @@ from warp_torchrl.prediction.scores.null_models import circle_cells, ellipse_cel
 from warp_torchrl.prediction.scores.scar import Scores, scores_at_area, scores_of
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.behaviour.moistures import MOISTURES
-from warp_torchrl.world.fires.on_map import arrival_minutes
+from warp_torchrl.world.fires.arrival_minutes import arrival_minutes
 from warp_torchrl.world.law.rate import RateFire
 
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)

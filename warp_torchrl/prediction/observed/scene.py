@@ -11,8 +11,8 @@ from torch import Tensor
 
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.fires.alone import Burned
+from warp_torchrl.world.fires.arrival_minutes import on_map
 from warp_torchrl.world.fires.members import Members
-from warp_torchrl.world.fires.on_map import on_map
 from warp_torchrl.world.fires.pieces import Gusts
 from warp_torchrl.world.fires.sightings import beside
 from warp_torchrl.world.fires.spell import Spell, can_ignite, spells_of

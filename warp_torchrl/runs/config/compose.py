@@ -243,13 +243,12 @@ def option_names(group: str) -> list[str]:
 
 def option_values(group: str, option: str) -> dict[str, Any]:
     """Return the values of an option: its class's defaults, and what its file says; nothing where there is none."""
-    if option not in option_names(group):
-        return {}
-    target = dict(_targets(group))[option]
-    paths = [folder / group / f"{option}.yaml" for folder in (conf_folder(), *conf_folders())]
-    said = next((plain(cast("DictConfig", OmegaConf.load(path))) for path in paths if path.is_file()), {})
-    kind = component(target)
-    return {**({} if kind is None else defaults(kind)), **said}
+    for folder in (conf_folder(), *conf_folders()):
+        if (folder / group / f"{option}.yaml").is_file():
+            found = FileConfigSource("option", str(folder)).load_config(f"{group}/{option}")
+            return plain(cast("DictConfig", found.config))
+    kind = component(registered(group).get(option))
+    return {} if kind is None else defaults(kind)
 
 
 def _targets(group: str) -> Iterator[tuple[str, str]]:

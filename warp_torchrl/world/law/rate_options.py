@@ -1,4 +1,4 @@
-"""What law ``rate`` is given: fuels, moistures, factors on the rates and how they differ."""
+"""Options of law ``rate``: fuels, moistures, and factors on the rates."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -23,7 +23,7 @@ class RateOptions(Automaton):
     Attributes:
         model: Fuel models: ``fbfm13`` (Anderson 1982), ``fbfm40`` (Scott and Burgan 2005) or ``fbp`` (Canadian).
         fuel_models: Fuel models of one's own by code, in place of those of ``model``: each a mapping of the fields of
-            ``rates.fuel_models.FuelModel``.
+            ``behaviour.fuel_models.FuelModel``.
         minutes_per_tick: Minutes of a tick; None takes half of what the fastest fire needs for a cell of the landscape.
         residence: Minutes that a cell burns at least.
         wet_minutes: Minutes for which a tree that was put out cannot ignite.

@@ -1,4 +1,4 @@
-"""When fires without vehicles reach the cells of the whole map."""
+"""Minutes of arrival on the whole map, of fires without vehicles."""
 
 from collections.abc import Iterator, Sequence
 
