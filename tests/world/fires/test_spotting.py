@@ -55,6 +55,7 @@ def test_without_heat_for_any_nothing_changes_to_the_bit() -> None:
     plain = arrivals(None, minutes=40.0)
     for none in (Firebrands(per_heat=0.0), Firebrands(least_intensity=1e6)):
         assert torch.equal(plain, arrivals(none, minutes=40.0))
+    assert not torch.equal(plain, arrivals(BRANDS, minutes=40.0)), "firebrands do change it"
 
 
 def test_a_fire_is_the_same_in_any_window_and_batch(monkeypatch: pytest.MonkeyPatch) -> None:
