@@ -30,9 +30,9 @@ def guided(learner: Learner, imitation: Imitation, env: WildfireEnv) -> Learner:
     if imitation.guide is None:
         return learner
     *acts, explores = learner.explore.module
-    return replace(
-        learner, explore=_Guided(TensorDictSequential(*acts), explores, seeing_all(HEURISTICS[imitation.guide], env))
-    )
+    kind = HEURISTICS[imitation.guide]
+    guide = seeing_all(kind, env) if imitation.privileged else kind(env)
+    return replace(learner, explore=_Guided(TensorDictSequential(*acts), explores, guide))
 
 
 class _Guided(TensorDictModuleBase):

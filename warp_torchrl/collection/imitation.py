@@ -26,6 +26,8 @@ class Imitation:
     Attributes:
         teacher: Labels the states that the team visits: one of ``TEACHERS``, a shipped policy, a run folder or a
             checkpoint; None has no teacher.
+        privileged: Whether a heuristic that teaches or guides sees the true worlds (Chen et al., "Learning by
+            Cheating", 2020); if not, it acts on what the team knows, as in play.
         demonstrations: Folder of recordings, whose acts of people are cloned; None clones nothing.
         minibatch_size: Acts of people in an optimiser step, of all processes.
         weight: Weight of the cloning losses at the start; it falls linearly.
@@ -39,6 +41,7 @@ class Imitation:
     """
 
     teacher: str | None = None
+    privileged: bool = True
     demonstrations: str | None = None
     minibatch_size: int = 256
     weight: float = 1.0

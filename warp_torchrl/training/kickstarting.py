@@ -35,7 +35,8 @@ def kickstart(learner: Learner, imitation: Imitation, env: WildfireEnv, factor: 
     """
     if imitation.teacher is None:
         return learner
-    cloning, taught_by = _KickstartingLoss(imitation, learner, factor), teacher(imitation.teacher, env)
+    cloning = _KickstartingLoss(imitation, learner, factor)
+    taught_by = teacher(imitation.teacher, env, imitation.privileged)
     keeps = {"teacher": taught_by} if isinstance(taught_by, TrainedTeacher) else {}
     return replace(
         learner,

@@ -66,14 +66,20 @@ class TrainedTeacher:
             raise ConfigError("imitation.teacher has other weights than when this run began: give it the former")
 
 
-def teacher(name: str, env: WildfireEnv) -> Heuristic | TrainedTeacher:
+def teacher(name: str, env: WildfireEnv, privileged: bool = True) -> Heuristic | TrainedTeacher:
     """Return the teacher of a name: a heuristic, a shipped policy, a run folder or a checkpoint.
+
+    Args:
+        name: Name.
+        env: The training environment.
+        privileged: Whether a heuristic sees the true worlds where sight is limited.
 
     Raises:
         ConfigError: See ``TrainedTeacher``.
         CheckpointError: If a folder holds no sound checkpoint.
     """
     if name in HEURISTICS:
-        return seeing_all(HEURISTICS[name], env)
+        kind = HEURISTICS[name]
+        return seeing_all(kind, env) if privileged else kind(env)
     found, _ = checkpoints.newest(find_policy(name))
     return TrainedTeacher(found, name, env)
