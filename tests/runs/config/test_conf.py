@@ -205,7 +205,7 @@ def test_every_scenario_is_a_run(scenario):
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
 @pytest.mark.usefixtures("all_experiments")
 def test_every_experiment_is_a_run(experiment):
-    if experiment == "advised":
+    if experiment == "believing":
         pytest.importorskip("warp_torchrl.world.mechanics.radio.radio", reason="a team believes together by radio")
     values = plain(compose_config("train", [f"experiment={experiment}"]))
     if values["device"] == "cuda" and not torch.cuda.is_available():
