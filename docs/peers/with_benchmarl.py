@@ -31,7 +31,7 @@ SEEN = ("agents", "observation", "all")
 def flattened(env):
     """Return an environment whose agents see one vector."""
     numbers = UnaryTransform(in_keys=[VIEW], out_keys=[VIEW], fn=lambda view: view.flatten(-3) / 255)
-    return TransformedEnv(env, Compose(numbers, CatTensors(in_keys=[VIEW, STATUS], out_key=SEEN, dim=-1)))
+    return TransformedEnv(env, Compose(numbers, CatTensors(in_keys=[VIEW, STATUS], out_key=SEEN, sort=False)))
 
 
 class Skirmish(Wildfire):
@@ -59,12 +59,14 @@ class Until(Callback):
             raise TimeIsUpError
 
 
-def main(minutes: float, seed: int, worlds: int) -> None:
+def main(minutes: float, seed: int, worlds: int, as_shipped: bool) -> None:
     """Train a team, and let it play the fires that all policies are compared by."""
     torch.set_num_threads(1)
     config = ExperimentConfig.get_from_yaml()
     config.loggers, config.create_json, config.evaluation, config.render = [], False, False, False
     config.on_policy_n_envs_per_worker, config.on_policy_collected_frames_per_batch = worlds, 96 * worlds
+    if not as_shipped:  # the numbers of Stable-Baselines3's PPO
+        config.lr, config.on_policy_n_minibatch_iters, config.on_policy_minibatch_size = 3e-4, 10, 1024
     config.max_n_frames, config.save_folder = 10**9, "outputs"
     Path(config.save_folder).mkdir(exist_ok=True)
     network = MlpConfig(num_cells=[256, 256], layer_class=nn.Linear, activation_class=nn.Tanh)
@@ -93,4 +95,5 @@ if __name__ == "__main__":
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--worlds", type=int, default=64)
+    parser.add_argument("--as-shipped", action="store_true", help="with BenchMARL's rate, passes and minibatches")
     main(**vars(parser.parse_args()))
