@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from tests.training.test_kickstarting import configured, sample_of
+from tests.world.mechanics.there import needs
 from warp_torchrl.api.make import make_env
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.heuristics.heuristic import seeing_all
@@ -63,6 +64,7 @@ def test_a_run_folder_may_teach_and_a_heuristic_is_itself(weak_run):
     assert torch.equal(simple(shown.clone())[ACTION], simple.choose(env.world_state, shown[ACTION_MASK]))
 
 
+@needs("sensing")
 @pytest.mark.parametrize("source", ["teacher", "guide"])
 @pytest.mark.parametrize("privileged", [True, False])
 def test_who_is_not_privileged_acts_on_what_the_team_knows(tmp_path, source, privileged):
