@@ -18,8 +18,6 @@ from torchrl.envs.utils import step_mdp
 
 from warp_torchrl import make_env
 
-NETWORK = {"net_arch": [256, 256]}
-
 
 class AgentsOfWorlds(VecEnv):
     """Each agent of each world is an environment of its own, as SuperSuit has it, without a process or a copy."""

@@ -7,7 +7,7 @@ from tests.training.test_kickstarting import configured, sample_of
 from tests.world.mechanics.there import needs
 from warp_torchrl.api.make import make_env
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.heuristics.heuristic import seeing_all
+from warp_torchrl.heuristics.heuristic import instructor
 from warp_torchrl.models import ACTION, ACTION_MASK, TEACHER_ACTION
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.saved_config import SavedConfig
@@ -71,7 +71,7 @@ def test_who_is_not_privileged_acts_on_what_the_team_knows(tmp_path, source, pri
     keys = ["scenario=search", "n_worlds=16", f"imitation.privileged={str(privileged).lower()}"]
     keys += [f"imitation.{source}=dispatch", *(["algorithm=dqn"] if source == "guide" else [])]
     learner, env = (training := student(tmp_path, "imitation.teacher=null", *keys)).learner, training.env
-    now, plays, sees = env.reset(), HEURISTICS["dispatch"](env), seeing_all(HEURISTICS["dispatch"], env)
+    now, plays, sees = env.reset(), HEURISTICS["dispatch"](env), instructor(HEURISTICS["dispatch"], env)
     who = learner.explore._teacher if source == "teacher" else learner.explore._guide
     said, knows, sees = (each(now.select(ACTION_MASK).clone())[ACTION] for each in (who, plays, sees))
     assert torch.equal(said, sees if privileged else knows)

@@ -15,7 +15,7 @@ from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collection.imitation import Imitation
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS, Heuristic
-from warp_torchrl.heuristics.heuristic import seeing_all
+from warp_torchrl.heuristics.heuristic import instructor
 from warp_torchrl.models import ACTION, ACTION_MASK
 
 
@@ -30,8 +30,7 @@ def guided(learner: Learner, imitation: Imitation, env: WildfireEnv) -> Learner:
     if imitation.guide is None:
         return learner
     *acts, explores = learner.explore.module
-    kind = HEURISTICS[imitation.guide]
-    guide = seeing_all(kind, env) if imitation.privileged else kind(env)
+    guide = instructor(HEURISTICS[imitation.guide], env, imitation.privileged)
     return replace(learner, explore=_Guided(TensorDictSequential(*acts), explores, guide))
 
 

@@ -88,8 +88,8 @@ class Heuristic(TensorDictModuleBase):
         raise TypeError(f"{type(self).__name__} does not say what to do: define choose()")
 
 
-def seeing_all(kind: type[Heuristic], env: Worlds) -> Heuristic:
-    """Return a heuristic that sees the true worlds, as only those may who teach and do not play."""
+def instructor(kind: type[Heuristic], env: Worlds, privileged: bool = True) -> Heuristic:
+    """Return a heuristic that teaches or guides: if privileged it sees the true worlds, else it acts as in play."""
     made = kind(env)
-    made.sees_all = True
+    made.sees_all = privileged
     return made

@@ -10,7 +10,7 @@ from torchrl.envs.utils import set_exploration_type
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.observation import Observation
 from warp_torchrl.heuristics import HEURISTICS, Heuristic
-from warp_torchrl.heuristics.heuristic import seeing_all
+from warp_torchrl.heuristics.heuristic import instructor
 from warp_torchrl.models import ACTION_MASK, AGENCY, OBSERVATION, ROLE, recurrent_actors
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import Checkpoint
@@ -79,7 +79,6 @@ def teacher(name: str, env: WildfireEnv, privileged: bool = True) -> Heuristic |
         CheckpointError: If a folder holds no sound checkpoint.
     """
     if name in HEURISTICS:
-        kind = HEURISTICS[name]
-        return seeing_all(kind, env) if privileged else kind(env)
+        return instructor(HEURISTICS[name], env, privileged)
     found, _ = checkpoints.newest(find_policy(name))
     return TrainedTeacher(found, name, env)

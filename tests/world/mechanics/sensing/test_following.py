@@ -10,7 +10,7 @@ from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.heuristics.heuristic import seeing_all
+from warp_torchrl.heuristics.heuristic import instructor
 from warp_torchrl.world.air.wind import Calm
 from warp_torchrl.world.arrays.distances import chebyshev_distance
 from warp_torchrl.world.ignition.ignition import Ignition
@@ -36,7 +36,7 @@ def test_a_fire_that_no_agent_sees_moves_teachers_alone(make_small_env, name):
     states = [state.replace(cells=each, vehicles=vehicles) for each in (trees, trees.masked_fill(burns, 11))]
     masks = [env.world.possible_actions(each) for each in states]
     assert torch.equal(*(HEURISTICS[name](env).act(*each) for each in zip(states, masks, strict=True)))
-    acts = [seeing_all(HEURISTICS[name], env).act(*each) for each in zip(states, masks, strict=True)]
+    acts = [instructor(HEURISTICS[name], env).act(*each) for each in zip(states, masks, strict=True)]
     assert torch.equal(*acts) != HEURISTICS[name].reads_map
 
 
