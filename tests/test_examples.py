@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 EXAMPLES = Path(__file__).parent.parent / "docs" / "examples"
+PEERS = EXAMPLES.parent / "peers"
 QUICK = {"pettingzoo_round_trip", "frame_stack_torchrl", "training_loop"}
 CASES = {  # packages that it needs, steps, what it prints
     "training_loop": ((), 1024, r"1024 steps, \d+\.\d% of the trees saved"),
@@ -39,6 +40,18 @@ def test_an_example_runs(name, tmp_path, monkeypatch, capsys):
     runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
     last = capsys.readouterr().out.strip().splitlines()[-1]
     assert re.fullmatch(says, last), last
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "package"), [("with_sb3", "sb3_contrib"), ("with_benchmarl", "benchmarl")])
+def test_a_peer_trains_and_plays_the_fires(name, package, tmp_path, monkeypatch, capsys):
+    pytest.importorskip(package, reason=f"{name}.py needs {package}")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(PEERS)
+    monkeypatch.setattr(sys, "argv", [f"{name}.py", "--minutes", "0.01", "--worlds", "4"])
+    runpy.run_path(str(PEERS / f"{name}.py"), run_name="__main__")
+    last = capsys.readouterr().out.strip().splitlines()[-1]
+    assert re.fullmatch(r"\d+ world steps in 0.01 minutes: \d+\.\d \+- \d\.\d % saved", last), last
 
 
 def test_the_training_loop_is_60_lines_that_know_the_environment_alone():
