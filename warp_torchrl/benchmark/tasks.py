@@ -31,8 +31,8 @@ SCENARIOS = (
     "paper_marl",
 )
 """Default scenarios of ``tasks``; ``giant`` takes long, and ``landfire`` needs its rasters."""
-GENERAL = tuple(name for name in HEURISTICS if name not in ("clockwise", "rollout"))
-"""The heuristics of the tables: ``clockwise`` is made for a fire in the middle of the map, ``rollout`` is slow."""
+GENERAL = tuple(name for name in HEURISTICS if name not in ("clockwise", "rollout", "switching"))
+"""The heuristics of the tables: ``clockwise`` is made for a fire in the middle of the map, planners are slow."""
 EPISODES = 256
 FIRST_SEED = 1_000_000
 

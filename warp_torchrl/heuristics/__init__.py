@@ -17,6 +17,7 @@ from warp_torchrl.heuristics.reactive import Greedy, Local, NoOp, Random
 from warp_torchrl.heuristics.ring import Mixed, Ring
 from warp_torchrl.heuristics.rollout import Rollout
 from warp_torchrl.heuristics.searching import Lawnmower, Oldest, Searching
+from warp_torchrl.heuristics.switching import Switching
 from warp_torchrl.heuristics.tactics import AnchorAndFlank, FlankAttack, HeadAttack, PointProtection
 from warp_torchrl.heuristics.targeting import Targeted
 from warp_torchrl.validation import check_new_name
@@ -41,6 +42,7 @@ HEURISTICS: dict[str, type[Heuristic]] = {
     "anchor_and_flank": AnchorAndFlank,
     "point_protection": PointProtection,
     "rollout": Rollout,
+    "switching": Switching,
 }
 """Heuristic policies by name; ``heuristic`` adds to them."""
 TEACHERS = {name: kind for name, kind in HEURISTICS.items() if not kind.is_stateful}
@@ -89,6 +91,7 @@ __all__ = [
     "Ring",
     "Rollout",
     "Searching",
+    "Switching",
     "Targeted",
     "Worlds",
     "heuristic",

@@ -9,15 +9,12 @@ from warp_torchrl.heuristics.base import distance_to_cells
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.heuristics.dispatch import Dispatch
 from warp_torchrl.heuristics.heuristic import Heuristic, Worlds
+from warp_torchrl.heuristics.imagining import played, trees_saved
 from warp_torchrl.heuristics.seeking import can_act_on_fire
 from warp_torchrl.world.arrays.random import imagined_keys
 from warp_torchrl.world.fires.imagined import imagined, rules_in_sight
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.state import WorldState
-from warp_torchrl.world.world import World
-
-_PART = 8
-"""Imagined worlds go on without those that have ended when these are one in so many: to move the others takes time."""
 
 
 class Rollout(Heuristic):
@@ -131,26 +128,9 @@ class Rollout(Heuristic):
         for at in torch.arange(len(row) * count, device=row.device).split(self._at_once(futures)):
             tried, future = at // count, at % count
             own = row[tried] * self.samples + which.start + future
-            saved.append(self._play(world, futures[own], action[tried]))
+            saved.append(played(world, futures[own], self.policy.choose, self.horizon, trees_saved, action[tried]))
         return torch.cat(saved).view(-1, count)
 
     def _at_once(self, state: WorldState) -> int:
         """Return the number of worlds that are simulated in one batch."""
         return max(1, self.cells // state.cells[0].numel())
-
-    def _play(self, world: World, state: WorldState, action: Tensor) -> Tensor:
-        """Return the trees that stand in each world after ``horizon`` steps, the first with ``action``, int32 [n]."""
-        rows = torch.arange(len(action), device=action.device)
-        saved, counts = torch.zeros_like(state.step), None
-        for step in range(self.horizon):  # over time alone: all worlds that are imagined are one batch
-            if step:
-                action = self.policy.choose(state, world.possible_actions(state))
-            made = world.step(state, action, counts)
-            state, counts = made.after, made.counts_after
-            saved[rows] = counts.preserved + counts.extinguished
-            going = (~state.done).nonzero()[:, 0]
-            if not len(going):
-                break
-            if len(going) * _PART < len(rows) * (_PART - 1):
-                state, counts, rows = state[going], counts[going], rows[going]
-        return saved
