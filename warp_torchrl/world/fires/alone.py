@@ -25,8 +25,8 @@ from warp_torchrl.world.law.travel import travel
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.state.window import Window
 
-AT_ONCE = 64
-"""Fires that burn at once at most, whose planes a CPU's cache holds."""
+AT_ONCE = 256
+"""Fires that burn at once at most: more take longer, for their planes leave a CPU's cache."""
 _HEAD = 3  # planes of travel; then head, backing, intensity and flame length, and the kind of fire where crowns burn
 T = TypeVar("T")
 
