@@ -747,7 +747,7 @@ MISTAKES = [
     (
         ("evaluate.py", "checkpoint=skirmsh"),
         4,
-        "default, generalist, single, skirmish: did you mean skirmish?",
+        "default, generalist, single, skirmish, warp_v1: did you mean skirmish?",
     ),
     (("evaluate.py", "checkpoint=nowhere"), 4, "nowhere"),
 ]

@@ -19,11 +19,19 @@ from warp_torchrl.runs.policies.find import find_policy
 from warp_torchrl.system.shipped import policy_names
 
 SHIPPED = Path(__file__).parents[3] / "docs" / "policies"
-SCENARIOS = {"default": "default", "generalist": "default", "skirmish": "skirmish", "single": "single"}
+SCENARIOS = {
+    "default": "default",
+    "generalist": "default",
+    "skirmish": "skirmish",
+    "single": "single",
+    "warp_v1": "default",
+}
 """The scenario in which each is evaluated where nothing else is asked."""
-TO_PLAY = ["skirmish", *(pytest.param(name, marks=pytest.mark.slow) for name in ("default", "generalist", "single"))]
-LAST = {"generalist": "generalist_distilled"}
+TO_PLAY = ["skirmish", *(pytest.param(name, marks=pytest.mark.slow) for name in SCENARIOS if name != "skirmish")]
+LAST = {"generalist": "generalist_distilled", "warp_v1": "warp_v1_further"}
 """The experiment by which one was trained last, where that is not the one of its name."""
+OF_HAZARD = ("warp_v1",)
+"""Those of the law of the default scenarios."""
 
 
 def test_the_policies_are_those_of_the_docs():
@@ -75,9 +83,10 @@ def test_it_is_small_and_tells_of_no_machine(name, scenario):
 @pytest.mark.usefixtures("all_experiments")
 def test_it_is_trained_by_its_experiment(name):
     record = newest(SHIPPED / name)[0].saved_config()
-    its = [f"experiment={LAST.get(name, name)}", f"scenario=spread_{SCENARIOS[name]}", f"seed={record.values['seed']}"]
+    law, words = ("", dict) if name in OF_HAZARD else ("spread_", _in_old_words)
+    its = [f"experiment={LAST.get(name, name)}", f"scenario={law}{SCENARIOS[name]}", f"seed={record.values['seed']}"]
     config = compose_config("train", its)
-    expected, values = (_in_old_words(without_targets(plain(each))) for each in (config, restore(record)))
+    expected, values = (words(without_targets(plain(each))) for each in (config, restore(record)))
     assert {name: values[name] for name in record.values} == {name: expected[name] for name in record.values}
     assert {"reward", "observation", "imitation", "algorithm", "model", "total_frames"} <= set(record.values)
 
@@ -97,12 +106,15 @@ def _in_old_words(values):
 
 @pytest.mark.parametrize("name", TO_PLAY)
 def test_it_saves_far_more_than_local(name):
-    """On 12 fires the difference's standard error is below 6 points; its expectation is 27 and more."""
+    """On 12 fires the difference's standard error is below 6 points; its expectation is 27 and more.
+
+    Under law hazard, where `local` saves 79 %, it is 2.5 points, and 11.6.
+    """
     policy, found = load_policy(SHIPPED / name), newest(SHIPPED / name)[0]
     env = run_config(plain(restore(found.saved_config()))).make_env(12, 1_000_000)
     saved = play(env, policy, 1_000_000, policy.mode)["saved"].mean()
     local = play_heuristics(env, 1_000_000, ["local"])["local"]["saved"].mean()
-    assert saved > local + 0.12, (saved, local)
+    assert saved > local + (0.02 if name in OF_HAZARD else 0.12), (saved, local)
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
