@@ -12,6 +12,7 @@ from tests.world.drawing import differing
 from tests.world.mechanics.there import needs
 from warp_torchrl import make_env
 from warp_torchrl.heuristics import HEURISTICS, Dispatch, Heuristic, NoOp, PointProtection, Switching
+from warp_torchrl.heuristics.imagining import Choice
 from warp_torchrl.world.fires.imagined import imagined
 from warp_torchrl.world.state.state import Action, WorldState
 from warp_torchrl.world.world import World
@@ -92,6 +93,23 @@ def test_it_chooses_for_a_world_as_it_does_for_it_alone() -> None:
     together = choice(Quick(env), state)
     assert together != choice(NoOp(env), state)
     assert [choice(Quick(env), state[at : at + 1])[0] for at in range(6)] == together
+
+
+def test_it_plans_in_parts_as_it_does_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dispatch is said to be better in two of six worlds; three futures of each, in parts of five."""
+    env = make_env("skirmish", n_worlds=6)
+    env.reset()
+    policy, state = Quick(env), env.world_state
+    policy.cells = 5 * state.cells[0].numel()
+    better = state.key[[1, 4]]
+
+    def said(_: World, futures: WorldState, choose: Choice, *__: object) -> Tensor:
+        assert len(futures.key) <= 5
+        gain = torch.isin(futures.origin, better).double()
+        return gain if isinstance(choose.__self__, Dispatch) else torch.zeros_like(gain)
+
+    monkeypatch.setattr("warp_torchrl.heuristics.switching.played", said)
+    assert policy._best(state, torch.zeros(6, dtype=torch.int64)).tolist() == [0, 1, 0, 0, 1, 0]
 
 
 def test_futures_differ_and_none_is_the_true_one(monkeypatch: pytest.MonkeyPatch) -> None:

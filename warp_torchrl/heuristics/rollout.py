@@ -9,7 +9,7 @@ from warp_torchrl.heuristics.base import distance_to_cells
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.heuristics.dispatch import Dispatch
 from warp_torchrl.heuristics.heuristic import Heuristic, Worlds
-from warp_torchrl.heuristics.imagining import played, trees_saved
+from warp_torchrl.heuristics.imagining import CELLS, at_once, played, trees_saved
 from warp_torchrl.heuristics.seeking import can_act_on_fire
 from warp_torchrl.world.arrays.random import imagined_keys
 from warp_torchrl.world.fires.imagined import imagined, rules_in_sight
@@ -45,8 +45,7 @@ class Rollout(Heuristic):
     samples: ClassVar[int] = 8  # imagined futures, at least 2
     near: ClassVar[int] = 4  # cells
     errors: ClassVar[float] = 1.0  # standard errors that a gain must exceed
-    cells: ClassVar[int] = 2**21
-    """Of the worlds that are imagined at once; memory is bounded by it."""
+    cells: ClassVar[int] = CELLS  # of the worlds that are imagined at once
 
     def __init__(self, env: Worlds) -> None:
         super().__init__(env)
@@ -125,12 +124,8 @@ class Rollout(Heuristic):
         """
         world, count = rules_in_sight(self.world), len(which)
         saved = []
-        for at in torch.arange(len(row) * count, device=row.device).split(self._at_once(futures)):
+        for at in torch.arange(len(row) * count, device=row.device).split(at_once(futures, self.cells)):
             tried, future = at // count, at % count
             own = row[tried] * self.samples + which.start + future
             saved.append(played(world, futures[own], self.policy.choose, self.horizon, trees_saved, action[tried]))
         return torch.cat(saved).view(-1, count)
-
-    def _at_once(self, state: WorldState) -> int:
-        """Return the number of worlds that are simulated in one batch."""
-        return max(1, self.cells // state.cells[0].numel())

@@ -8,7 +8,7 @@ from torch import Tensor
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.heuristics.dispatch import Dispatch
 from warp_torchrl.heuristics.heuristic import Heuristic, Worlds
-from warp_torchrl.heuristics.imagining import played
+from warp_torchrl.heuristics.imagining import CELLS, at_once, played
 from warp_torchrl.heuristics.tactics import HeadAttack, PointProtection
 from warp_torchrl.world.arrays.random import imagined_keys
 from warp_torchrl.world.fires.imagined import imagined, rules_in_sight
@@ -49,6 +49,7 @@ class Switching(Heuristic):
     horizon: ClassVar[int] = 120  # steps
     samples: ClassVar[int] = 4  # imagined futures, at least 2
     errors: ClassVar[float] = 1.0  # standard errors that a gain must exceed
+    cells: ClassVar[int] = CELLS  # of the worlds that are imagined at once
 
     def __init__(self, env: Worlds) -> None:
         super().__init__(env)
@@ -77,8 +78,13 @@ class Switching(Heuristic):
         keys = imagined_keys(state.key, state.step, self.samples)
         futures = imagined(self.world.futures(state, self.samples), keys.flatten(), self.world)
         world = rules_in_sight(self.world)
-        told = [played(world, futures, each.choose, self.horizon, self._reached) for each in self.policies]
-        reached = torch.stack(told).unflatten(1, (-1, self.samples)).movedim(0, 1)
+        parts = torch.arange(len(futures.key), device=state.key.device).split(at_once(futures, self.cells))
+
+        def ends(policy: Heuristic) -> Tensor:
+            told = [played(world, futures[part], policy.choose, self.horizon, self._reached) for part in parts]
+            return torch.cat(told).view(-1, self.samples)
+
+        reached = torch.stack([ends(policy) for policy in self.policies], dim=1)
         gain = reached - reached.gather(1, followed[:, None, None].expand(-1, 1, self.samples))
         sure = gain.mean(dim=2) - self.errors * gain.std(dim=2) / self.samples**0.5
         best = sure.max(dim=1)
