@@ -7,7 +7,7 @@ shown. Specs, signatures and packings read the rows; an entry is what their func
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from torch import Tensor
 
@@ -63,7 +63,12 @@ class Context:
     @cached_property
     def assumed(self) -> WorldState:
         """Return the worlds as agents assume them to be, see ``World.assumed``."""
-        return self.world.assumed(self.state)
+        return self.world.assumed(self.state) if self.world.sensing.is_limited else self.state
+
+    @cached_property
+    def kept(self) -> dict[str, Any]:
+        """Return results that several functions need, by name; empty at first."""
+        return {}
 
 
 IsThere = Callable[[World, Choice], bool]

@@ -24,7 +24,6 @@ from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.team.presence import on_scene
 from warp_torchrl.world.team.team import Team
-from warp_torchrl.world.world import World
 
 _NEAR = 8.0
 """Moves at which a place is e times less near [cells]."""
@@ -57,7 +56,7 @@ def _way(name: str) -> Callable[[Function], Function]:
 def way_to_fire(now: Context) -> Tensor:
     """Return the way to the nearest fire that can be put out, float32 [B, A, 3]."""
     known = _known(now)
-    cells, burns = _fires(known.assumed, now.world)
+    cells, burns = _fires(now)
     moves = moves_between(known.place, *rows_and_columns(cells, known.assumed))
     return _told(moves.masked_fill(~burns[:, None], torch.inf), moves, cells, known)
 
@@ -72,7 +71,7 @@ def way_to_share(now: Context) -> Tensor:
     """
     known = _known(now)
     forecast = now.forecast if known.assumed is now.state else now.world.forecast(known.assumed)
-    cells, burns = _fires(known.assumed, now.world)
+    cells, burns = _fires(now)
     risk = forecast.fire_risk().flatten(1).gather(1, cells)
     moves = moves_between(known.place, *rows_and_columns(cells, known.assumed))
     own = fire_front(burns, risk)[:, None] & _is_nearest(moves, known, now.world.team)
@@ -104,7 +103,7 @@ class _Known(NamedTuple):
 
 def _known(now: Context) -> _Known:
     state, world = now.state, now.world
-    assumed, place = now.assumed if world.sensing.is_limited else state, state.vehicles.position
+    assumed, place = now.assumed, state.vehicles.position
     if len(assumed.key) == len(place):
         return _Known(assumed, place, on_scene(state), 1)
     agents, (known, told) = place.shape[1], world.sensing.knows_where(state, world.team, world.hearing)
@@ -113,10 +112,13 @@ def _known(now: Context) -> _Known:
     return _Known(assumed, places.flatten(0, 1), (known | self).flatten(0, 1), agents)
 
 
-def _fires(state: WorldState, world: World) -> tuple[Tensor, Tensor]:
+def _fires(now: Context) -> tuple[Tensor, Tensor]:
     """Return the fires that can be put out, flat indices int64 [R, K], and which are no padding, bool [R, K]."""
-    fire = can_be_put_out(state, world)
-    return first_cells(fire, fire[0].numel())
+    if "fires" not in now.kept:
+        fire = can_be_put_out(now.assumed, now.world)
+        now.kept["fires"] = first_cells(fire, fire[0].numel())
+    cells, burns = now.kept["fires"]
+    return cells, burns
 
 
 def _is_nearest(moves: Tensor, known: _Known, team: Team) -> Tensor:

@@ -28,6 +28,11 @@ class Wind(ABC):
         """Return whether the wind of a tick may differ from that of the tick before."""
         return False
 
+    @property
+    def wanders(self) -> bool:
+        """Return whether the wind of every tick differs from that of the tick before."""
+        return False
+
     @abstractmethod
     def __call__(self, key: Tensor, size: tuple[int, int], corner: Tensor | None = None) -> Tensor:
         """Return the field of each world at the start, float32 [B, 2, 1, 1] or [B, 2, H, W] [m/s].
@@ -187,6 +192,11 @@ class Wandering(Wind):
 
     @property
     def changes(self) -> bool:
+        """Return True."""
+        return True
+
+    @property
+    def wanders(self) -> bool:
         """Return True."""
         return True
 

@@ -44,11 +44,13 @@ def neighbour_in(direction: int, plane: Tensor) -> Tensor:
 
 def neighbours(plane: Tensor, beyond: float) -> Tensor:
     """Return what each cell's neighbours hold, [8, B, H, W]; a number beyond the map."""
-    height, width = plane.shape[-2:]
-    padded = pad(plane, (1, 1, 1, 1), value=beyond)
-    return torch.stack(
-        [padded[..., 1 + row : 1 + row + height, 1 + column : 1 + column + width] for row, column in DIRECTIONS]
-    )
+    return torch.stack(slices(pad(plane, (1, 1, 1, 1), value=beyond)))
+
+
+def slices(padded: Tensor) -> list[Tensor]:
+    """Return the neighbour in each direction of the cells of maps with a margin of one, [B, H, W] each; views."""
+    height, width = padded.shape[-2] - 2, padded.shape[-1] - 2
+    return [padded[..., 1 + row : 1 + row + height, 1 + column : 1 + column + width] for row, column in DIRECTIONS]
 
 
 def grow(mask: Tensor, radius: int = 1) -> Tensor:

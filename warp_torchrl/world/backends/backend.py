@@ -17,8 +17,10 @@ from warp_torchrl.world.arrays.compile import is_fused
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.backends.band import AtBand
 from warp_torchrl.world.backends.edge import AtEdge
+from warp_torchrl.world.backends.on_demand import on_demand
 from warp_torchrl.world.backends.planes import WholeMaps
 from warp_torchrl.world.backends.table import Tabled, pattern_table
+from warp_torchrl.world.backends.turning import in_air
 from warp_torchrl.world.law.arrivals import RATE
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.law.fire import Fire, Gains, Slopes
@@ -95,6 +97,8 @@ def forecast(fire: Automaton, state: WorldState) -> Forecast:
 
 def air(fire: Automaton, wind: Tensor, moisture: Tensor | None, ground: Ground) -> Air:
     """Return a wind with all that follows from it on some ground; the arguments are those of ``Automaton.air``."""
+    if type(fire) is RateFire and fire.wind_wanders and _may_read(wind.device):
+        return on_demand(fire, wind, moisture, ground)
     made = fire.air(wind, moisture, ground)
     if not isinstance(fire, Fire) or type(fire) not in COVERED:
         return made
@@ -119,7 +123,8 @@ def in_wind(fire: Automaton, state: WorldState, wind: Tensor, moisture: Tensor |
         return state
     rows = state[index]
     damp = None if moisture is None else moisture[index]
-    changed = fire.in_air(rows, air(fire, wind[index], damp, rows.ground)).leaves()
+    turned = in_air if type(fire) is RateFire else type(fire).in_air
+    changed = turned(fire, rows, air(fire, wind[index], damp, rows.ground)).leaves()
     leaves = state.leaves()
     put = {name: leaves[name].index_copy(0, index, leaf) for name, leaf in changed.items() if _follows_air(name)}
     return state.with_leaves({**leaves, **put})

@@ -16,9 +16,9 @@ from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.backends.edge import places
 from warp_torchrl.world.backends.planes import is_fuel, spreads
-from warp_torchrl.world.law.arrivals import Arrivals, arrivals_in, beside, kindled, known, sources, terms_of
+from warp_torchrl.world.law.arrivals import Arrivals, arrivals_in, beside, is_waiting, known, metric_at, sources
 from warp_torchrl.world.law.rate import RateFire
-from warp_torchrl.world.law.travel import NEVER, NOWHERE, Metric, Places, arrival, rate_from
+from warp_torchrl.world.law.travel import NEVER, NOWHERE, Places, arrival, kindling, rate_from
 from warp_torchrl.world.state.state import WorldState
 
 
@@ -49,13 +49,22 @@ class AtBand:
         """Return what ``RateFire.next_arrivals`` does."""
         return self._arrivals(state, self._band(state))
 
-    def _band(self, state: WorldState) -> "_Band":
+    def _band(self, state: WorldState) -> "Band":
         burns = spreads(self.fire, state)
         fuel = is_fuel(self.fire, state) & above(state.alpha, 0.0)
-        near = beside(burns, fuel, kindled(state, self.fire.now(state), fuel))
-        return _band_of(places(byte(near).flatten()), state, burns, fuel)
+        near = beside(burns, fuel, self._kindled(state, fuel))
+        return band_of(places(byte(near).flatten()), state, burns, fuel)
 
-    def _arrivals(self, state: WorldState, band: "_Band") -> Arrivals:
+    def _kindled(self, state: WorldState, fuel: Tensor) -> Tensor:
+        """Return what ``arrivals.kindled`` does."""
+        kept, now = arrivals_in(state), self.fire.now(state)
+        waits = is_waiting(kept, now, fuel)
+        cell = places(byte(waits).flatten())
+        slowness, _, _ = metric_at(state.ground, state.air, cell)
+        soon = kindling(kept.minutes.flatten().index_select(0, cell), slowness) <= of_world(now, cell, state)
+        return torch.zeros_like(waits).flatten().scatter_(0, cell, soon).view_as(waits)
+
+    def _arrivals(self, state: WorldState, band: "Band") -> Arrivals:
         kept, times = arrivals_in(state), sources(state, self.fire.now(state), band.spreads, band.fuel)
         at_origin = known(state, times).flatten()
         here, own = times.flatten().index_select(0, band.cell), band.row * state.cells.shape[2] + band.column
@@ -66,8 +75,8 @@ class AtBand:
             return at_origin.index_select(0, band.first + origin)
 
         at = Places(band.row, band.column, state.cells.shape[2], time_of)
-        minutes, origin = arrival(times, origins, _metric(state, band.cell), at)
-        minutes = torch.maximum(minutes, self._earliest(state, band))
+        minutes, origin = arrival(times, origins, metric_at(state.ground, state.air, band.cell), at)
+        minutes = torch.maximum(minutes, of_world(self.fire.earliest(state), band.cell, state))
         holds = (kept.origin.flatten().index_select(0, band.cell) == own) & (here <= minutes)
         holds &= burning.any(0)
         minutes, origin = torch.where(holds, here, minutes), torch.where(holds, own, origin)
@@ -77,13 +86,9 @@ class AtBand:
             _put(nowhere, band.cell, origin),
         )
 
-    def _earliest(self, state: WorldState, band: "_Band") -> Tensor:
-        each = band.first.div(state.cells[0].numel(), rounding_mode="floor")
-        return self.fire.earliest(state).flatten().index_select(0, each)
-
-    def _expected_ignitions(self, state: WorldState, band: "_Band") -> Tensor:
+    def _expected_ignitions(self, state: WorldState, band: "Band") -> Tensor:
         burns = padded(band.spreads, 0)
-        metric = _metric(state, band.cell)
+        metric = metric_at(state.ground, state.air, band.cell)
         total = torch.zeros_like(burns, dtype=torch.float32)
         for direction in range(8):
             source = band.around[direction]
@@ -94,7 +99,9 @@ class AtBand:
 
 
 @dataclass(frozen=True, eq=False)
-class _Band:
+class Band:
+    """Some cells of the worlds, and what is about them."""
+
     cell: Tensor  # flat index in [B, H, W], int64 [N]
     first: Tensor  # flat index of the first cell of the same world, int64 [N]
     row: Tensor  # int32 [N]
@@ -104,7 +111,8 @@ class _Band:
     fuel: Tensor  # the trees that can ignite, bool [B, H, W]
 
 
-def _band_of(cell: Tensor, state: WorldState, spreads: Tensor, fuel: Tensor) -> _Band:
+def band_of(cell: Tensor, state: WorldState, spreads: Tensor, fuel: Tensor) -> Band:
+    """Return the band of some cells, flat indices in [B, H, W], int64 [N]; see ``Band`` for the planes."""
     _, height, width = state.cells.shape
     world = cell.div(height * width, rounding_mode="floor")
     place = cell - world * (height * width)
@@ -112,7 +120,7 @@ def _band_of(cell: Tensor, state: WorldState, spreads: Tensor, fuel: Tensor) -> 
     column = place - row * width
     here = (world * (height + 2) + row + 1) * (width + 2) + column + 1
     around = _around(width, cell.device) + here
-    return _Band(cell, world * (height * width), row.to(torch.int32), column.to(torch.int32), around, spreads, fuel)
+    return Band(cell, world * (height * width), row.to(torch.int32), column.to(torch.int32), around, spreads, fuel)
 
 
 @kept(32)
@@ -126,11 +134,9 @@ def padded(plane: Tensor, beyond: float) -> Tensor:
     return pad(plane, (1, 1, 1, 1), value=beyond).flatten()
 
 
-def _metric(state: WorldState, cell: Tensor) -> Metric:
-    made, pace = terms_of(state.ground, state.air)
-    factor = pace.flatten().index_select(0, cell)
-    slowness, east, north = (made[:, part].flatten().index_select(0, cell) * factor for part in range(3))
-    return slowness, east, north
+def of_world(values: Tensor, cell: Tensor, state: WorldState) -> Tensor:
+    """Return values of worlds, [B, 1, 1], in some cells, flat indices in [B, H, W], int64 [N]; [N]."""
+    return values.flatten().index_select(0, cell.div(state.cells[0].numel(), rounding_mode="floor"))
 
 
 def _put(plane: Tensor, cell: Tensor, values: Tensor) -> Tensor:

@@ -1,6 +1,7 @@
 """Common result of all models of fire spread: the fire's head."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 
 from torch import Tensor
 
@@ -15,3 +16,7 @@ class Spread:
     intensity: Tensor  # fireline intensity at the head (Byram 1959) [kW/m]
     flame_length: Tensor  # at the head [m]
     kind: Tensor  # of fire at the head: 0 surface, 1 passive crown fire, 2 active crown fire
+
+    def each(self, change: Callable[[Tensor], Tensor]) -> "Spread":
+        """Return the same with every field changed."""
+        return Spread(**{field.name: change(getattr(self, field.name)) for field in fields(self)})

@@ -2,8 +2,9 @@
 
 import torch
 from torch import Tensor
+from torch.nn.functional import pad
 
-from warp_torchrl.world.arrays.geometry import neighbour_in
+from warp_torchrl.world.arrays.geometry import neighbour_in, slices
 from warp_torchrl.world.law.arrivals import metric
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import rate_from
@@ -33,12 +34,14 @@ def worth_ahead(state: WorldState, world: World, worth: Tensor, within: float = 
     """
     fuel = world.fire.can_ignite(state)
     comes = [neighbour_in(direction, each * fuel) for direction, each in enumerate(_kept(state, world, within))]
-    ahead = torch.zeros_like(worth)
+    beyond = pad(worth, (1, 1, 1, 1))  # the more of worth and V, with a margin
+    inside, around = beyond[:, 1:-1, 1:-1], slices(beyond)
+    ahead, one = torch.empty_like(worth), torch.empty_like(worth)
     for _ in range(max(worth.shape[1:]) // 2):  # over the length of ways
-        beyond = torch.maximum(worth, ahead)
-        ahead = comes[0] * neighbour_in(0, beyond)
-        for direction in range(1, 8):
-            ahead = torch.maximum(ahead, comes[direction] * neighbour_in(direction, beyond))
+        torch.mul(comes[0], around[0], out=ahead)
+        for there, neighbour in zip(comes[1:], around[1:], strict=True):
+            torch.maximum(ahead, torch.mul(there, neighbour, out=one), out=ahead)
+        torch.maximum(worth, ahead, out=inside)
     return ahead
 
 

@@ -13,7 +13,7 @@ from warp_torchrl.world.air.sunlight import Sunlight
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.behaviour.moistures import in_force, moisture_row
 from warp_torchrl.world.behaviour.spread import Spread
-from warp_torchrl.world.law.fuel_bed import gradient
+from warp_torchrl.world.law.listed import gradient
 from warp_torchrl.world.law.passing import head_behaviour
 from warp_torchrl.world.law.rate import TICKS_PER_CELL, RateFire
 from warp_torchrl.world.state.state import Landscape

@@ -1,5 +1,6 @@
 """Times of arrival, the planes that law ``rate`` keeps in its worlds, and the terms that they follow from."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import torch
@@ -24,6 +25,7 @@ from warp_torchrl.world.state.state import Air, Ground, WorldState
 
 RATE = "rate"
 """The law's name, under which its worlds hold ``Arrivals``."""
+_OTHER_LAW = "the worlds must be those of a fire with rates of spread"
 
 
 @dataclass(eq=False, repr=False)
@@ -34,10 +36,48 @@ class Paces(Batch):
 
 
 @dataclass(eq=False, repr=False)
-class Travel(Batch):
-    """What the law makes of a wind."""
+class Beds(Batch):
+    """Response of each fuel model in each world, see ``BedResponse`` and ``FuelBed.beds``."""
 
-    travel: Tensor  # float32 [B,3,H,W], a, w_east and w_north, see ``travel.travel`` [minutes a cell]
+    rate: Tensor  # float32 [B,F]
+    heat: Tensor  # float32 [B,F]
+    wind_scale: Tensor  # float32 [B,F]
+    wind_power: Tensor  # float32 [B,F]
+    slope_scale: Tensor  # float32 [B,F]
+    top_wind: Tensor  # float32 [B,F]
+
+
+@dataclass(eq=False, repr=False)
+class Terms(Batch, ABC):
+    """What the law makes of a wind: a, w_east and w_north, see ``travel.travel`` [minutes a cell]."""
+
+    beds: Beds | None  # None of the Canadian system
+
+    @abstractmethod
+    def on(self, ground: Ground, air: Air) -> Tensor:
+        """Return them on some ground in the air that has these terms, float32 [B, 3, H, W]."""
+
+    @abstractmethod
+    def at(self, ground: Ground, air: Air, cell: Tensor) -> Tensor:
+        """Return them in some cells, int64 [N], flat indices in [B, H, W]; float32 [3, N]."""
+
+
+@dataclass(eq=False, repr=False)
+class Travel(Terms):
+    """Terms that are kept, made once for all cells."""
+
+    travel: Tensor  # float32 [B,3,H,W]
+
+    def on(self, ground: Ground, air: Air) -> Tensor:
+        """See ``Terms``."""
+        return self.travel
+
+    def at(self, ground: Ground, air: Air, cell: Tensor) -> Tensor:
+        """See ``Terms``."""
+        count = self.travel[0, 0].numel()
+        first = cell + 2 * count * cell.div(count, rounding_mode="floor")
+        flat = self.travel.flatten()
+        return torch.stack([flat.index_select(0, first + part * count) for part in range(3)])
 
 
 @dataclass(eq=False, repr=False)
@@ -53,21 +93,42 @@ def arrivals_in(state: WorldState) -> Arrivals:
     return state.planes(RATE, Arrivals)
 
 
-def terms_of(ground: Ground, air: Air) -> tuple[Tensor, Tensor]:
-    """Return the travel in some air and the pace on some ground, float32 [B, 3, H, W] and [B, H, W].
+def pace_on(ground: Ground) -> Tensor:
+    """Return the factor on the fire's times on some ground, float32 [B, H, W].
+
+    Raises:
+        ValueError: If the ground is of another law.
+    """
+    if not isinstance(ground.terms, Paces):
+        raise ValueError(_OTHER_LAW)
+    return ground.terms.pace
+
+
+def metric(ground: Ground, air: Air) -> Metric:
+    """Return a, w_east and w_north of the fire on some ground in some air, float32 [B, H, W] each [minutes a cell].
 
     Raises:
         ValueError: If they are of another law.
     """
-    if not isinstance(air.terms, Travel) or not isinstance(ground.terms, Paces):
-        raise ValueError("the worlds must be those of a fire with rates of spread")
-    return air.terms.travel, ground.terms.pace
-
-
-def metric(ground: Ground, air: Air) -> Metric:
-    """Return a, w_east and w_north of the fire on some ground in some air, float32 [B, H, W] each [minutes a cell]."""
-    made, pace = terms_of(ground, air)
+    made, pace = terms_of(air).on(ground, air), pace_on(ground)
     return made[:, 0] * pace, made[:, 1] * pace, made[:, 2] * pace
+
+
+def metric_at(ground: Ground, air: Air, cell: Tensor) -> Metric:
+    """Return what ``metric`` does in some cells, int64 [N], flat indices in [B, H, W]; float32 [N] each."""
+    slowness, east, north = terms_of(air).at(ground, air, cell) * pace_on(ground).flatten().index_select(0, cell)
+    return slowness, east, north
+
+
+def terms_of(air: Air) -> Terms:
+    """Return what the law makes of a wind.
+
+    Raises:
+        ValueError: If it is of another law.
+    """
+    if not isinstance(air.terms, Terms):
+        raise ValueError(_OTHER_LAW)
+    return air.terms
 
 
 def started(state: WorldState) -> WorldState:
@@ -123,8 +184,8 @@ def beside(spreads: Tensor, fuel: Tensor, kindled: Tensor) -> Tensor:
 
 def kindled(state: WorldState, now: Tensor, fuel: Tensor) -> Tensor:
     """Return the trees that the fire is about to reach, bool [B, H, W]; the arguments are those of ``in_air``."""
-    kept, (made, pace) = arrivals_in(state), terms_of(state.ground, state.air)
-    return is_waiting(kept, now, fuel) & (kindling(kept.minutes, made[:, 0] * pace) <= now)
+    kept, (slowness, _, _) = arrivals_in(state), metric(state.ground, state.air)
+    return is_waiting(kept, now, fuel) & (kindling(kept.minutes, slowness) <= now)
 
 
 def sources(state: WorldState, now: Tensor, spreads: Tensor, fuel: Tensor) -> Tensor:

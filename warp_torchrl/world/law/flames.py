@@ -14,7 +14,7 @@ from torch import Tensor
 from warp_torchrl.world.arrays.constants import numbers
 from warp_torchrl.world.arrays.geometry import DIRECTIONS, offsets
 from warp_torchrl.world.arrays.listing import filled
-from warp_torchrl.world.law.arrivals import terms_of
+from warp_torchrl.world.law import arrivals
 from warp_torchrl.world.law.automaton import at_cells
 from warp_torchrl.world.law.cells import is_burning
 from warp_torchrl.world.law.rate import RateFire
@@ -40,8 +40,10 @@ def heat_of(fire: RateFire, state: WorldState) -> Tensor:
 
 def metric_at(state: WorldState, cell: Tensor) -> Metric:
     """Return a, w_east and w_north of the fire in some cells, int64 [B, n], float32 [B, n] each [minutes a cell]."""
-    made, pace = terms_of(state.ground, state.air)
-    slowness, east, north = (at_cells(made, cell) * at_cells(pace, cell)[:, None]).unbind(1)
+    flat = cell + torch.arange(0, state.cells.numel(), state.cells[0].numel(), device=cell.device)[:, None]
+    slowness, east, north = (
+        each.view(cell.shape) for each in arrivals.metric_at(state.ground, state.air, flat.flatten())
+    )
     return slowness, east, north
 
 
@@ -101,21 +103,24 @@ def strongest_into(state: WorldState, heat: Tensor | None, alike: float, cell: T
     return (strong * burns).amax(dim=-1)
 
 
-def weakest_way_out(state: WorldState, heat: Tensor, is_way: Tensor) -> Tensor:
-    """Return the least intensity of a front that leaves each cell, float32 [B, H, W] [kW/m]; inf where no way is open.
+def weakest_way_out(state: WorldState, heat: Tensor, is_way: Tensor, cell: Tensor) -> Tensor:
+    """Return the least intensity of a front that leaves some cells, float32 [B, n] [kW/m]; inf where no way is open.
 
     Args:
         state: The worlds.
         heat: See ``heat_of``.
-        is_way: Which of the eight ways out of each cell are open, bool [8, B, H, W], as ``geometry.DIRECTIONS``.
+        is_way: Which cells a front may leave to, bool [B, H, W].
+        cell: Flat index, int64 [B, n].
     """
-    made, pace = terms_of(state.ground, state.air)
-    slowness, east, north = ((each * pace) for each in made.unbind(1))
-    least = torch.full_like(heat, torch.inf)
-    for (row, column), is_open in zip(DIRECTIONS, is_way, strict=True):
-        ways = torch.full_like(heat, column), torch.full_like(heat, -row)
-        there = intensity(heat, (slowness, east, north), *ways, state.ground.cell_size)
-        least = torch.where(is_open, torch.minimum(least, there), least)
+    (height, width), own, metric = state.cells.shape[1:], at_cells(heat, cell), metric_at(state, cell)
+    row, column, is_way = cell.div(width, rounding_mode="floor"), cell % width, is_way.flatten(1)
+    least = torch.full_like(own, torch.inf)
+    for down, right in DIRECTIONS:
+        there = row + down, column + right
+        inside = (there[0] >= 0) & (there[0] < height) & (there[1] >= 0) & (there[1] < width)
+        is_open = inside & is_way.gather(1, torch.where(inside, there[0] * width + there[1], 0))
+        ways = torch.full_like(own, right), torch.full_like(own, -down)
+        least = torch.where(is_open, torch.minimum(least, intensity(own, metric, *ways, state.ground.cell_size)), least)
     return least
 
 

@@ -7,7 +7,7 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
-from warp_torchrl.world.law.arrivals import arrivals_in, terms_of
+from warp_torchrl.world.law.arrivals import arrivals_in, pace_on
 from warp_torchrl.world.law.automaton import at_cells
 from warp_torchrl.world.law.passing import HeadBehaviour, head_behaviour, passing, steepness_from
 from warp_torchrl.world.law.rate import RateFire
@@ -34,8 +34,6 @@ def front_at(fire: RateFire, state: WorldState, cell: Tensor) -> Front:
     arrival = at_cells(minutes, cell)
     then = head_behaviour(fire.head_at(state, cell))
     heads = HeadBehaviour(*(each[:, 0] for each in (then.head, then.backing, then.intensity, then.flame_length)))
-    _, pace = terms_of(state.ground, state.air)
-    rate, intensity, flame_length = passing(
-        steepness_from(around, arrival), at_cells(pace, cell), heads, state.ground.cell_size
-    )
+    pace = at_cells(pace_on(state.ground), cell)
+    rate, intensity, flame_length = passing(steepness_from(around, arrival), pace, heads, state.ground.cell_size)
     return Front(arrival, rate, intensity, flame_length)

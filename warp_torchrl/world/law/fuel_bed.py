@@ -7,10 +7,9 @@ from typing import Any, get_args
 
 import torch
 from torch import Tensor
-from torch.nn.functional import pad
 
 from warp_torchrl.world.air.wind import Wind
-from warp_torchrl.world.arrays.batch import Named
+from warp_torchrl.world.arrays.listing import filled
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.behaviour.acceleration import OPEN, mean_share, slowed
 from warp_torchrl.world.behaviour.crown import (
@@ -26,9 +25,11 @@ from warp_torchrl.world.behaviour.fbp_fuels import CURING
 from warp_torchrl.world.behaviour.fuel_codes import read_model
 from warp_torchrl.world.behaviour.fuel_models import FuelTable
 from warp_torchrl.world.behaviour.moistures import MOISTURES, in_force
+from warp_torchrl.world.behaviour.rothermel import BedResponse, bed_response
 from warp_torchrl.world.behaviour.spread import Spread
-from warp_torchrl.world.behaviour.surface import surface_spread
+from warp_torchrl.world.behaviour.surface import head_of_fire, surface_spread
 from warp_torchrl.world.law.canopy import crowns_of, lack_of_canopy, to_midflame
+from warp_torchrl.world.law.listed import bearing, gradient
 from warp_torchrl.world.law.mapped_fuel import check_codes
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.terrain.source import LandscapeSource
@@ -107,6 +108,8 @@ class FuelBed:
         cell_size: float,
         rise: Tensor | None = None,
         young: tuple[float, float] | None = None,
+        world: Tensor | None = None,
+        beds: BedResponse | None = None,
     ) -> Spread:
         """Return what a fire's head does in each cell, float32 [B, H, W] each; rates on the map, not along the ground.
 
@@ -118,25 +121,28 @@ class FuelBed:
             rise: How steeply the ground rises, see ``gradient``; None makes it of the landscapes' elevation.
             young: Minutes since ignition over which the spread is the mean of a fire that accelerates; None: it is
                 steady.
+            world: Of which world each cell's moisture is, int64 [H, W], where landscapes are ``listed`` cells of all
+                worlds in one row; None: of the world that the cell is in.
+            beds: Of the moisture by world, see ``beds``; None makes them.
         """
         rise = gradient(landscape.elevation, landscape.cover, cell_size) if rise is None else rise
         rise = rise * self.slope_gain
         steepness = torch.rad2deg(torch.atan(rise.square().sum(1).clamp(min=1e-12).sqrt()))
         air = {
             "wind_speed": wind.square().sum(1).clamp(min=1e-12).sqrt() * self.wind_gain,
-            "wind_bearing": bearing(-wind[:, 0], -wind[:, 1]),
+            "wind_bearing": bearing(-wind[:, 0].double(), -wind[:, 1].double()).float(),  # to the bit in any batch
             "slope": steepness,
             "aspect": bearing(-rise[:, 0], -rise[:, 1]),
         }
         fuel = self.fuel(landscape)
         if self.table is None:
-            spread = self._canadian(fuel, moisture, young, **air)
+            spread = self._canadian(fuel, _of_cells(moisture, world), young, **air)
         else:
             table = _on(self.table, fuel.device)
             factor = to_midflame(table.fuels.depth[table.index(fuel)], landscape)
             midflame = {**air, "wind_speed": air["wind_speed"] * factor}
-            spread = self._rothermel(fuel, moisture, **midflame)
-            spread = self._with_crowns(spread, landscape, moisture, **air)
+            spread = self._rothermel(fuel, moisture, world, beds, **midflame)
+            spread = self._with_crowns(spread, landscape, _of_cells(moisture, world), **air)
             spread = replace(spread, head=spread.head * _on_map(spread.direction, rise))
             spread = spread if young is None else slowed(spread, mean_share(OPEN, *young))
         factor = self._factor(fuel)
@@ -158,7 +164,7 @@ class FuelBed:
         slope: Tensor,
         aspect: Tensor,
     ) -> Spread:
-        codes = dict(zip(MOISTURES, _of_cells(moisture).unbind(-1), strict=True))
+        codes = dict(zip(MOISTURES, moisture.unbind(-1), strict=True))
         return fbp_spread(
             fuel,
             wind_speed=wind_speed,
@@ -176,9 +182,35 @@ class FuelBed:
             young=young,
         )
 
-    def _rothermel(self, fuel: Tensor, moisture: Tensor, **air: Tensor) -> Spread:
+    def _rothermel(
+        self,
+        fuel: Tensor,
+        moisture: Tensor,
+        world: Tensor | None = None,
+        beds: BedResponse | None = None,
+        *,
+        wind_speed: Tensor,
+        **air: Tensor,
+    ) -> Spread:
         table = _on(self.table, fuel.device)
-        return surface_spread(table, table.index(fuel), **air, moisture=moisture[..., :5])
+        if moisture.dim() == 4:
+            return surface_spread(table, table.index(fuel), wind_speed=wind_speed, **air, moisture=moisture[..., :5])
+        beds = self.beds(moisture) if beds is None else beds
+        world = torch.arange(len(moisture), device=fuel.device)[:, None, None] if world is None else world
+        row = table.index(fuel) + _models(table) * world
+        return head_of_fire(beds.at(row), wind_speed * 60.0, **air)
+
+    def beds(self, moisture: Tensor) -> BedResponse:
+        """Return the response of each of Rothermel's fuel models in each world, float32 [B, F] each.
+
+        F fills vectors, see ``arrays.listing``: a world alone has the numbers of one among others.
+
+        Args:
+            moisture: In the order of ``MOISTURES``, float32 [B, 7].
+        """
+        table = _on(self.table, moisture.device)
+        models = torch.arange(_models(table), device=moisture.device).clamp(max=len(table.fuels.depth) - 1)
+        return bed_response(table.fuels.at(models), moisture[:, None, :5])
 
     def runs_in_crowns(self, landscape: Landscape) -> bool:
         """Return whether the law burns crowns, and landscapes know theirs; Canadian rates have crown fire in them."""
@@ -200,7 +232,7 @@ class FuelBed:
         return with_crowns(
             surface,
             canopy,
-            Surroundings(**air, moisture=_of_cells(moisture)[..., :5]),
+            Surroundings(**air, moisture=moisture[..., :5]),
             heat=table.fuels.heat[table.index(fuel)] * KILOJOULES_PER_KG,
             foliar_moisture=FOLIAR_MOISTURE if self.foliar_moisture is None else self.foliar_moisture,
             model=self.crown,
@@ -221,7 +253,8 @@ class FuelBed:
         air: dict[str, Any] = {"wind_speed": zero + _REFERENCE_WIND}
         air |= dict.fromkeys(("wind_bearing", "slope", "aspect"), zero)
         rule = self._canadian if self.table is None else self._rothermel
-        rates = rule(codes[None, None], moisture[None].to(fuel.device), **air)
+        damp = moisture[None].to(fuel.device)
+        rates = rule(codes[None, None], _of_cells(damp) if self.table is None else damp, **air)
         share = (rates.head / rates.head.max().clamp(min=1e-6)).sqrt()[0, 0]
         return share.index_select(0, (fuel - codes[0]).flatten().to(torch.int32)).view(fuel.shape)
 
@@ -243,6 +276,11 @@ def _on(table: FuelTable | None, device: torch.device) -> FuelTable:
     return table.to(device=device)
 
 
+def _models(table: FuelTable) -> int:
+    """Return the number of rows of a table, filled up to whole vectors."""
+    return filled(len(table.fuels.depth))
+
+
 def _on_map(direction: Tensor, rise: Tensor) -> Tensor:
     """Return how far a way along the ground goes on the map: the cosine of the slope in its direction."""
     angle = torch.deg2rad(direction)
@@ -250,33 +288,8 @@ def _on_map(direction: Tensor, rise: Tensor) -> Tensor:
     return torch.rsqrt(1.0 + climb * climb)
 
 
-def gradient(elevation: Tensor | None, cover: Tensor, cell_size: float) -> Tensor:
-    """Return how steeply the ground rises to the east and to the north, float32 [B, 2, H, W]; 0 where it is level.
-
-    By Horn's differences over the eight neighbours (Horn 1981), the border's cells repeated beyond it.
-    """
-    if elevation is None:
-        return torch.zeros(len(cover), 2, *cover.shape[1:], device=cover.device)
-    ground = pad(elevation[:, None], (1, 1, 1, 1), mode="replicate")[:, 0]
-    across = ground[:, :, 2:] - ground[:, :, :-2]
-    along = ground[:, :-2] - ground[:, 2:]
-    east = (across[:, :-2] + 2.0 * across[:, 1:-1] + across[:, 2:]) / (8.0 * cell_size)
-    north = (along[:, :, :-2] + 2.0 * along[:, :, 1:-1] + along[:, :, 2:]) / (8.0 * cell_size)
-    return torch.stack((east, north), dim=1)
-
-
-def listed(landscape: Landscape, cell: Tensor) -> Landscape:
-    """Return some cells of landscapes, int64 [B, n], as maps of one row; what rises is read of the whole ones."""
-    planes = {"cover": landscape.cover, "age": landscape.age, **landscape.layers.held}
-    own = {name: plane.flatten(1).gather(1, cell)[:, None] for name, plane in planes.items()}
-    return Landscape(own.pop("cover"), own.pop("age"), None, layers=Named(own))
-
-
-def bearing(east: Tensor, north: Tensor) -> Tensor:
-    """Return where a vector points, degrees clockwise from grid north in [0, 360)."""
-    return torch.rad2deg(torch.atan2(east, north + (north == 0.0) * (east == 0.0))) % 360.0
-
-
-def _of_cells(moisture: Tensor) -> Tensor:
-    """Return moistures [B, 7] or [B, H, W, 7] as those of cells, [B, 1, 1, 7] or [B, H, W, 7]."""
+def _of_cells(moisture: Tensor, world: Tensor | None = None) -> Tensor:
+    """Return moistures [B, 7] or [B, H, W, 7] as those of cells, [B, 1, 1, 7] or [B, H, W, 7]; see ``spread``."""
+    if world is not None:
+        return moisture[world][None]
     return moisture if moisture.dim() == 4 else moisture[:, None, None]

@@ -11,12 +11,13 @@ from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.geometry import grow, neighbour_in
 from warp_torchrl.world.arrays.random import Stream, log_deviation, uniform, uniform_at
 from warp_torchrl.world.behaviour.moistures import fine_moisture, in_force, moisture_row
+from warp_torchrl.world.behaviour.rothermel import BedResponse
 from warp_torchrl.world.behaviour.spread import Spread
 from warp_torchrl.world.law import arrivals
-from warp_torchrl.world.law.arrivals import RATE, Arrivals, Paces, Travel, arrivals_in, metric, own_cell
+from warp_torchrl.world.law.arrivals import RATE, Arrivals, Beds, Paces, Terms, Travel, arrivals_in, metric, own_cell
 from warp_torchrl.world.law.automaton import Beside, at_cells
 from warp_torchrl.world.law.cells import is_burning, is_tree
-from warp_torchrl.world.law.fuel_bed import gradient, listed
+from warp_torchrl.world.law.listed import gradient_at, listed
 from warp_torchrl.world.law.rate_options import RateOptions
 from warp_torchrl.world.law.travel import NEVER, rate_from, travel
 from warp_torchrl.world.state.state import FIRST_FIRE, Air, Ground, Landscape, WorldState
@@ -70,11 +71,12 @@ class RateFire(RateOptions):
         if self.acceleration:
             raise ValueError("fire.acceleration must be false in worlds that step: warp predict and calibrate read it")
         law = self.on(landscape)
+        law = law._told(_by_cover=law._by_cover, _wind_wanders=wind.wanders)
         if law.minutes_per_tick is not None:
             return law
         fastest = law.bed.fastest(landscape, wind, cell_size, moisture_row(law.moisture))
         minutes = min(60.0, max(0.05, float(f"{cell_size / fastest / TICKS_PER_CELL:.2g}")))
-        return replace(law, minutes_per_tick=minutes)._going_by(law._by_cover)
+        return replace(law, minutes_per_tick=minutes)._told(_by_cover=law._by_cover, _wind_wanders=wind.wanders)
 
     def flammability(self, landscape: Landscape) -> Tensor:
         """Return the square root of the rate on level ground in a wind of 5 m/s, of the fastest fuel's there."""
@@ -117,14 +119,36 @@ class RateFire(RateOptions):
         """See ``Automaton``."""
         spread = self.bed.spread(ground.landscape, wind, self._damp(Air(wind, moisture)), ground.cell_size)
         made = travel(spread.head, spread.direction, spread.length_to_breadth, ground.cell_size)
-        return Air(wind, moisture, Travel(made))
+        return Air(wind, moisture, Travel(self.beds_in(Air(wind, moisture)), made))
 
     def head_at(self, state: WorldState, cell: Tensor) -> Spread:
         """Return the behaviour of the fire's head in some cells now, float32 [B, 1, n] each; cell is int64 [B, n]."""
-        size, wind = state.ground.cell_size, state.wind
-        rise = at_cells(gradient(state.landscape.elevation, state.cover, size), cell)[:, :, None]
-        wind = wind if wind.shape[2:] == (1, 1) else at_cells(wind, cell)[:, :, None]
-        return self.bed.spread(listed(state.landscape, cell), wind, self._damp(state.air), size, rise)
+        first = torch.arange(0, state.cells.numel(), state.cells[0].numel(), device=cell.device)
+        spread = self.spread_at(state.ground, state.air, (cell + first[:, None]).flatten())
+        return spread.each(lambda of: of.reshape(len(cell), 1, cell.shape[1]))
+
+    def beds_in(self, air: Air) -> Beds | None:
+        """Return the response of each fuel model in some air, see ``FuelBed.beds``."""
+        return None if self.bed.table is None else Beds(**vars(self.bed.beds(self._damp(air))))
+
+    def spread_at(self, ground: Ground, air: Air, cell: Tensor) -> Spread:
+        """Return the behaviour of the fire's head in some cells, float32 [1, 1, N] each.
+
+        Args:
+            ground: Of the worlds.
+            air: Of the worlds.
+            cell: Flat indices in [B, H, W], int64 [N]; numbers depend on the batch unless N fills vectors, see
+                ``arrays.listing``.
+        """
+        cell, landscape, wind, size = cell[None], ground.landscape, air.wind, ground.cell_size
+        world = cell.div(ground.alpha[0].numel(), rounding_mode="floor")
+        places = wind[0, 0].numel()  # of one wind, or of each cell's
+        first = 2 * world if places == 1 else world * places + cell
+        wind = torch.stack([wind.flatten()[first + part * places] for part in (0, 1)], dim=1)[:, :, None]
+        rise = gradient_at(landscape.elevation, landscape.cover, size, cell)[:, :, None]
+        beds = air.terms.beds if isinstance(air.terms, Terms) else self.beds_in(air)
+        response = None if beds is None else BedResponse(**vars(beds))
+        return self.bed.spread(listed(landscape, cell), wind, self._damp(air), size, rise, world=world, beds=response)
 
     def fine_moisture(self, air: Air) -> Tensor:
         """Return the moisture of fine dead fuel, float32 [B] [%]."""
@@ -194,7 +218,7 @@ class RateFire(RateOptions):
         """
         count, size = rate.shape[1], state.ground.cell_size
         landscape = listed(state.landscape, beside.cell)
-        rise = beside.of(gradient(state.landscape.elevation, state.cover, size))[:, :, None]
+        rise = gradient_at(state.landscape.elevation, state.cover, size, beside.cell)[:, :, None]
         wind = air.wind
         if wind.shape[2:] != (1, 1):
             wind = at_cells(wind.unflatten(0, (-1, count)), beside.cell).flatten(0, 1)[:, :, None]

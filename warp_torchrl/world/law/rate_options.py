@@ -77,6 +77,7 @@ class RateOptions(Automaton):
     cell_deviation: float = 0.1
     fire_deviation: float = 0.0
     _by_cover: bool = field(default=False, init=False, repr=False)
+    _wind_wanders: bool = field(default=False, init=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -125,7 +126,7 @@ class RateOptions(Automaton):
         Raises:
             ValueError: If the fuel codes of the landscape are of another model, or the model lacks some.
         """
-        law = self._going_by(self.fuel_of_cover is not None and has_own_table(landscape))
+        law = self._told(_by_cover=self.fuel_of_cover is not None and has_own_table(landscape))
         law.bed.check(landscape)
         return law
 
@@ -143,15 +144,21 @@ class RateOptions(Automaton):
 
     def alike(self) -> Self:
         """Return the law under which fires differ from cell to cell alone."""
-        return replace(self, fire_deviation=0.0)._going_by(self._by_cover)
+        return replace(self, fire_deviation=0.0)._told(_by_cover=self._by_cover, _wind_wanders=self._wind_wanders)
 
     def with_state(self, **state: Any) -> Self:
         """Return the law with another state of its fuel: ``curing``, ``green``, ``foliar_moisture``."""
-        return replace(self, **state)._going_by(self._by_cover)
+        return replace(self, **state)._told(_by_cover=self._by_cover, _wind_wanders=self._wind_wanders)
 
-    def _going_by(self, cover: bool) -> Self:
-        """Return the law that takes the fuel of the cover, or of the landscape's codes."""
+    @property
+    def wind_wanders(self) -> bool:
+        """Return whether the wind of the worlds changes with every tick."""
+        return self._wind_wanders
+
+    def _told(self, **told: bool) -> Self:
+        """Return the law with marks of its worlds: ``_by_cover``, ``_wind_wanders``."""
         law = replace(self)
-        object.__setattr__(law, "_by_cover", cover)
+        for name, value in told.items():
+            object.__setattr__(law, name, value)
         law.__dict__.pop("bed")  # made before it was told
         return law

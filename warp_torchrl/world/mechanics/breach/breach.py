@@ -72,7 +72,8 @@ class Breach(Mechanic):
 
     def after_tick(self, state: WorldState, ticks_now: Tensor, world: Rules) -> WorldState:
         """Return worlds in which fire reached over firebreaks, in those that ticked."""
-        return advance_rows(state, ticks_now, lambda rows, ticks: self._reach(rows, ticks, world.fire))
+        beside = (world.fire.spreads(state) & grow(state.firebreak)).flatten(1).any(dim=1)
+        return advance_rows(state, ticks_now & beside, lambda rows, ticks: self._reach(rows, ticks, world.fire))
 
     def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
         """Return ``breaches``."""

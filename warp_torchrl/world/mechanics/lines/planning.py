@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.arrays.bytes import byte
 from warp_torchrl.world.arrays.constants import numbers
-from warp_torchrl.world.arrays.geometry import neighbours
+from warp_torchrl.world.arrays.listing import list_cells
 from warp_torchrl.world.law.flames import weakest_way_out
 from warp_torchrl.world.mechanics.lines.production import metres_a_minute
 from warp_torchrl.world.mechanics.lines.tasks import AIRCRAFT, DONE, Lines, Pace
@@ -25,13 +26,16 @@ def open_fire(state: WorldState, heat: Tensor, limit: float) -> Tensor:
         heat: Of an area that burns, float32 [B, H, W] [kJ/m2].
         limit: Intensity of the front towards the agent, at most [kW/m].
     """
-    return is_burning(state.cells) & (_weakest(state, heat) <= limit)
+    burns = is_burning(state.cells)
+    cell, is_there = list_cells(burns)
+    able = byte(is_there & (_weakest(state, heat, cell) <= limit))
+    return torch.zeros_like(state.cells).flatten(1).scatter_reduce(1, cell, able, "amax").view_as(burns) > 0
 
 
-def _weakest(state: WorldState, heat: Tensor) -> Tensor:
-    """Return the intensity of each cell's front to the neighbour where it is weakest, float32 [B, H, W] [kW/m]."""
+def _weakest(state: WorldState, heat: Tensor, cell: Tensor) -> Tensor:
+    """Return the intensity of the front of some cells to the neighbour where it is weakest, float32 [B, n] [kW/m]."""
     stands = ~(is_burning(state.cells) | (state.cover == int(Cover.LAKE)))
-    return weakest_way_out(state, heat, neighbours(stands.to(torch.uint8), 0) > 0)
+    return weakest_way_out(state, heat, stands, cell)
 
 
 def steps_alone(state: WorldState, cells: Tensor, pace: Pace) -> Tensor:
@@ -46,7 +50,7 @@ def steps_alone(state: WorldState, cells: Tensor, pace: Pace) -> Tensor:
     """
     lines = state.planes("lines", Lines)
     alike = torch.full_like(cells, pace.alike, dtype=torch.float32)
-    strong = alike if lines.heat is None else _weakest(state, lines.heat).flatten(1).gather(1, cells)
+    strong = alike if lines.heat is None else _weakest(state, lines.heat, cells)
     minutes = strong * (pace.seconds * state.ground.cell_size / 60.0)
     steps = (minutes / lines.minutes).clamp(min=1.0)[:, None]
     limit = numbers(pace.strongest, cells.device)[lines.means]

@@ -15,7 +15,7 @@ from torch import Tensor
 
 from warp_torchrl.world.arrays.constants import numbers
 from warp_torchrl.world.law.anderson import NUMBERS, anderson_numbers
-from warp_torchrl.world.law.fuel_bed import gradient
+from warp_torchrl.world.law.listed import gradient
 from warp_torchrl.world.mechanics.mechanic import Rules
 from warp_torchrl.world.state.state import WorldState
 
