@@ -55,13 +55,13 @@ def test_the_weakest_way_out_is_against_the_wind_where_it_is_open():
     heat, ways = heat_of(FIRE, state), torch.ones(1, 3, 3, dtype=torch.bool)
     against = torch.tensor([[-1.0]]), torch.tensor([[0.0]])
     rear = intensity(heat[:, 1, 1][None], metric_at(state, MIDDLE), *against, 30.0).item()
-    assert weakest_way_out(state, heat, ways, MIDDLE).item() == pytest.approx(rear)
+    assert weakest_way_out(state, heat, ways, MIDDLE[0]).item() == pytest.approx(rear)
     ways[0, :, 0] = False
     sideways = torch.tensor([[0.0]]), torch.tensor([[1.0]])
     flank = intensity(heat[:, 1, 1][None], metric_at(state, MIDDLE), *sideways, 30.0).item()
-    assert weakest_way_out(state, heat, ways, MIDDLE).item() == pytest.approx(flank)
+    assert weakest_way_out(state, heat, ways, MIDDLE[0]).item() == pytest.approx(flank)
     assert flank > rear
-    assert weakest_way_out(state, heat, ~ways.any() & ways, MIDDLE).item() == float("inf")
+    assert weakest_way_out(state, heat, ~ways.any() & ways, MIDDLE[0]).item() == float("inf")
 
 
 def test_nothing_burns_without_fuel():

@@ -30,6 +30,21 @@ def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
     return index, torch.arange(index.shape[1], device=mask.device) < counts[:, None]
 
 
+def flat_cells(mask: Tensor) -> Tensor:
+    """Return the marked cells of all worlds, flat indices in [B, H, W], int64 [N].
+
+    On a device that would have to synchronise, every cell.
+    """
+    if needs_no_sync(mask.device):
+        return mask.flatten().nonzero()[:, 0]
+    return torch.arange(mask.numel(), device=mask.device)
+
+
+def in_all(cell: Tensor, count: int) -> Tensor:
+    """Return flat indices in each map of ``count`` cells, int64 [B, n], as those in all maps, int64 [B, n]."""
+    return cell + torch.arange(0, len(cell) * count, count, device=cell.device)[:, None]
+
+
 def filled(count: int) -> int:
     """Return the least number of cells that fill vectors, ``count`` or more and 64 at least."""
     return max(1, -(-count // VECTORS)) * VECTORS

@@ -10,6 +10,7 @@ short at its flanks and rear. Where that matters to the bit there are sums, prod
 
 import torch
 from torch import Tensor
+from torch.nn.functional import pad
 
 from warp_torchrl.world.arrays.constants import numbers
 from warp_torchrl.world.arrays.geometry import DIRECTIONS, offsets
@@ -104,23 +105,24 @@ def strongest_into(state: WorldState, heat: Tensor | None, alike: float, cell: T
 
 
 def weakest_way_out(state: WorldState, heat: Tensor, is_way: Tensor, cell: Tensor) -> Tensor:
-    """Return the least intensity of a front that leaves some cells, float32 [B, n] [kW/m]; inf where no way is open.
+    """Return the least intensity of a front that leaves some cells, float32 [N] [kW/m]; inf where no way is open.
 
     Args:
         state: The worlds.
         heat: See ``heat_of``.
         is_way: Which cells a front may leave to, bool [B, H, W].
-        cell: Flat index, int64 [B, n].
+        cell: Flat indices in [B, H, W], int64 [N].
     """
-    (height, width), own, metric = state.cells.shape[1:], at_cells(heat, cell), metric_at(state, cell)
-    row, column, is_way = cell.div(width, rounding_mode="floor"), cell % width, is_way.flatten(1)
+    _, height, width = state.cells.shape
+    metric, own = arrivals.metric_at(state.ground, state.air, cell), heat.flatten().index_select(0, cell)
+    line = cell.div(width, rounding_mode="floor")  # of all maps; with margins each map has two more
+    place = (line + 2 * line.div(height, rounding_mode="floor") + 1) * (width + 2) + cell % width + 1
+    ways = pad(is_way, (1, 1, 1, 1)).flatten()
     least = torch.full_like(own, torch.inf)
     for down, right in DIRECTIONS:
-        there = row + down, column + right
-        inside = (there[0] >= 0) & (there[0] < height) & (there[1] >= 0) & (there[1] < width)
-        is_open = inside & is_way.gather(1, torch.where(inside, there[0] * width + there[1], 0))
-        ways = torch.full_like(own, right), torch.full_like(own, -down)
-        least = torch.where(is_open, torch.minimum(least, intensity(own, metric, *ways, state.ground.cell_size)), least)
+        is_open = ways.index_select(0, place + down * (width + 2) + right)
+        way = torch.full_like(own, right), torch.full_like(own, -down)
+        least = torch.where(is_open, torch.minimum(least, intensity(own, metric, *way, state.ground.cell_size)), least)
     return least
 
 

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.geometry import grow, neighbour_in
+from warp_torchrl.world.arrays.listing import in_all
 from warp_torchrl.world.arrays.random import Stream, log_deviation, uniform, uniform_at
 from warp_torchrl.world.behaviour.moistures import fine_moisture, in_force, moisture_row
 from warp_torchrl.world.behaviour.rothermel import BedResponse
@@ -123,8 +124,7 @@ class RateFire(RateOptions):
 
     def head_at(self, state: WorldState, cell: Tensor) -> Spread:
         """Return the behaviour of the fire's head in some cells now, float32 [B, 1, n] each; cell is int64 [B, n]."""
-        first = torch.arange(0, state.cells.numel(), state.cells[0].numel(), device=cell.device)
-        spread = self.spread_at(state.ground, state.air, (cell + first[:, None]).flatten())
+        spread = self.spread_at(state.ground, state.air, in_all(cell, state.cells[0].numel()).flatten())
         return spread.each(lambda of: of.reshape(len(cell), 1, cell.shape[1]))
 
     def beds_in(self, air: Air) -> Beds | None:
@@ -188,7 +188,9 @@ class RateFire(RateOptions):
         here = ticks_now[:, None, None]
         end = ((state.tick + 1) * self.minutes)[:, None, None]
         reached = coming.minutes <= end
-        after = self.tick_with(state, u, ticks_now, torch.maximum(reached.to(torch.float32), self.spontaneous(state)))
+        q = reached.to(torch.float32)
+        q = q if self.beta == 0.0 else torch.maximum(q, self.spontaneous(state))
+        after = self.tick_with(state, u, ticks_now, q)
         after = self._held(state, after)
         lit = (after.cells == FIRST_FIRE) & ~is_burning(state.cells)
         kept, waits = arrivals_in(state), is_tree(after.cells)

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.arrays.bytes import byte
 from warp_torchrl.world.arrays.constants import numbers
-from warp_torchrl.world.arrays.listing import list_cells
+from warp_torchrl.world.arrays.listing import flat_cells, in_all
 from warp_torchrl.world.law.flames import weakest_way_out
 from warp_torchrl.world.mechanics.lines.production import metres_a_minute
 from warp_torchrl.world.mechanics.lines.tasks import AIRCRAFT, DONE, Lines, Pace
@@ -27,13 +26,13 @@ def open_fire(state: WorldState, heat: Tensor, limit: float) -> Tensor:
         limit: Intensity of the front towards the agent, at most [kW/m].
     """
     burns = is_burning(state.cells)
-    cell, is_there = list_cells(burns)
-    able = byte(is_there & (_weakest(state, heat, cell) <= limit))
-    return torch.zeros_like(state.cells).flatten(1).scatter_reduce(1, cell, able, "amax").view_as(burns) > 0
+    cell = flat_cells(burns)
+    able = burns.flatten().index_select(0, cell) & (_weakest(state, heat, cell) <= limit)
+    return torch.zeros_like(burns).flatten().scatter_(0, cell, able).view_as(burns)
 
 
 def _weakest(state: WorldState, heat: Tensor, cell: Tensor) -> Tensor:
-    """Return the intensity of the front of some cells to the neighbour where it is weakest, float32 [B, n] [kW/m]."""
+    """Return the intensity of the front of some cells, int64 [N], to the neighbour where it is weakest, float32 [N]."""
     stands = ~(is_burning(state.cells) | (state.cover == int(Cover.LAKE)))
     return weakest_way_out(state, heat, stands, cell)
 
@@ -50,7 +49,10 @@ def steps_alone(state: WorldState, cells: Tensor, pace: Pace) -> Tensor:
     """
     lines = state.planes("lines", Lines)
     alike = torch.full_like(cells, pace.alike, dtype=torch.float32)
-    strong = alike if lines.heat is None else _weakest(state, lines.heat, cells)
+    strong = alike
+    if lines.heat is not None:
+        every = in_all(cells, state.cells[0].numel())
+        strong = _weakest(state, lines.heat, every.flatten()).view_as(alike)
     minutes = strong * (pace.seconds * state.ground.cell_size / 60.0)
     steps = (minutes / lines.minutes).clamp(min=1.0)[:, None]
     limit = numbers(pace.strongest, cells.device)[lines.means]

@@ -185,7 +185,7 @@ class Values(Mechanic):
         exposure, area = state.planes(self.name, Exposure), _area(state)
         held = exposure.held | state.terminated
         return {
-            "worth_saved": self._left(exposure),
+            "worth_saved": exposure.left,
             "escaped": (area > self.escape_area).to(torch.float32),
             "contained": held.to(torch.float32),
             "contained_at": torch.where(held, exposure.grew, exposure.now),
