@@ -86,6 +86,16 @@ def test_what_is_reached_is_the_goal_then_the_forest(goal: str | None, sign: flo
     assert torch.equal(Quick(env)._reached(state, counts), told)
 
 
+@needs("values")
+def test_an_escape_counts_by_the_size_of_the_fire() -> None:
+    env = make_env("default", n_worlds=3, overrides=["mechanics.values={}", "goal=escaped"])
+    env.reset()
+    state, counts = env._current()
+    exposure = state.extras.held["values"].replace(size=torch.tensor([0.25, 1.0, 7.0]))
+    told = Quick(env)._reached(state.with_planes("values", exposure), counts) - 0.01 * counts.saved().double()
+    assert told.tolist() == pytest.approx([-0.25, -1.0, -1.0], abs=1e-12)
+
+
 def test_it_chooses_for_a_world_as_it_does_for_it_alone() -> None:
     env = make_env("shift", n_worlds=6, overrides=["landscape.size=16", "team.n_agents=2"])
     env.reset()

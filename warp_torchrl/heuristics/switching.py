@@ -23,9 +23,9 @@ class Switching(Heuristic):
     """Follows the tactic that does best in imagined fires: policy switching.
 
     Every ``period`` steps, once a vehicle is there, each tactic plays the same ``samples`` futures for ``horizon``
-    steps. What it reaches is the world's goal, and where that is alike the forest that stands. The team changes its
-    tactic for the one whose mean gain, less ``errors`` standard errors, is largest and above 0. It begins as the first.
-    ``Rollout`` tries single actions, and looks ahead too short for crews that build line for an hour.
+    steps. What it reaches is the world's goal, by ``Mechanic.degree`` where that is yes or no; where it is alike, the
+    forest that stands. The team changes its tactic for the one whose mean gain, less ``errors`` standard errors, is
+    largest and above 0. It begins as the first. ``Rollout`` tries single actions, and looks ahead too short for crews that build line for an hour.
 
     Where sight is limited futures begin with worlds that may be the true ones as far as the team knows
     (``World.futures``).
@@ -92,10 +92,15 @@ class Switching(Heuristic):
 
     def _reached(self, state: WorldState, counts: TreeCounts) -> Tensor:
         """Return how much of the goal each world has reached, more is better, float64 [n]."""
-        saved = counts.saved().to(torch.float64)
+        saved, goal = counts.saved().to(torch.float64), self.world.goal
+        if goal is None:
+            return saved
         for each in self.world.loop:
+            degree = each.degree(state, goal)
+            if degree is not None:
+                return degree.to(torch.float64) + _TIE * saved
             for row in each.metric_rows(self.world):
-                if row.name == self.world.goal:
-                    value = each.metrics(state)[row.name].to(torch.float64)
+                if row.name == goal:
+                    value = each.metrics(state)[goal].to(torch.float64)
                     return (-value if row.better == "less" else value) + _TIE * saved
         return saved

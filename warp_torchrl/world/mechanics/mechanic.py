@@ -267,6 +267,13 @@ class Mechanic:
         """Return the metrics of each world's episode so far, in their units, float32 [B] each by name."""
         return {}
 
+    def degree(self, state: WorldState, goal: str) -> Tensor | None:
+        """Return how well worlds do by a metric that is yes or no, float32 [B], more is better; planners compare it.
+
+        None where the mechanic does not grade the metric.
+        """
+        return None
+
     def entries(self, world: Rules) -> tuple[str, ...]:
         """Return the names of the numbers that ``status`` tells each agent; none of them turns with the map."""
         return ()

@@ -193,6 +193,10 @@ class Values(Mechanic):
             "cost": exposure.cost.clone(),
         }
 
+    def degree(self, state: WorldState, goal: str) -> Tensor | None:
+        """Return by ``escaped`` the share of ``escape_area`` that the fire has, at most 1, as a loss."""
+        return -state.planes(self.name, Exposure).size.clamp(max=1.0) if goal == "escaped" else None
+
     def buildings(self, state: WorldState) -> Tensor | None:
         """See ``Mechanic``: the assets. None where every tree is worth the same."""
         if not has_assets(state, self.points, self.houses):
