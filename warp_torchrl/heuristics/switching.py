@@ -25,7 +25,8 @@ class Switching(Heuristic):
     Every ``period`` steps, once a vehicle is there, each tactic plays the same ``samples`` futures for ``horizon``
     steps. What it reaches is the world's goal, by ``Mechanic.degree`` where that is yes or no; where it is alike, the
     forest that stands. The team changes its tactic for the one whose mean gain, less ``errors`` standard errors, is
-    largest and above 0. It begins as the first. ``Rollout`` tries single actions, and looks ahead too short for crews that build line for an hour.
+    largest and above 0. It begins as the first. ``Rollout`` tries single actions, and looks ahead too short for crews
+    that build line for an hour.
 
     Where sight is limited futures begin with worlds that may be the true ones as far as the team knows
     (``World.futures``).
