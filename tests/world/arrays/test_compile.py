@@ -32,6 +32,7 @@ AT_LENGTH = [
         *("fire=spread", "landscape.size=[9,16]", "fire.neighbours=4", "reward=collaborative"),
         *("observation=surroundings", "observation.centred=false"),
     ],
+    ["observation=local", "observation.ways=[fire,share]", "observation.water=true"],
     *map(list, of_mechanics("WORLDS").values()),
 ]
 

@@ -5,7 +5,7 @@ shown. Specs, signatures and packings read the rows; an entry is what their func
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
@@ -59,16 +59,12 @@ class Context:
     world: World
     forecast: Forecast
     choice: Choice
+    kept: dict[str, Any] = field(default_factory=dict)  # results that several functions need, by name
 
     @cached_property
     def assumed(self) -> WorldState:
         """Return the worlds as agents assume them to be, see ``World.assumed``."""
-        return self.world.assumed(self.state) if self.world.sensing.is_limited else self.state
-
-    @cached_property
-    def kept(self) -> dict[str, Any]:
-        """Return results that several functions need, by name; empty at first."""
-        return {}
+        return self.world.assumed(self.state)
 
 
 IsThere = Callable[[World, Choice], bool]

@@ -56,7 +56,7 @@ def _way(name: str) -> Callable[[Function], Function]:
 def way_to_fire(now: Context) -> Tensor:
     """Return the way to the nearest fire that can be put out, float32 [B, A, 3]."""
     known = _known(now)
-    cells, burns = _fires(now)
+    cells, burns = _fires(now, known.assumed)
     moves = moves_between(known.place, *rows_and_columns(cells, known.assumed))
     return _told(moves.masked_fill(~burns[:, None], torch.inf), moves, cells, known)
 
@@ -71,7 +71,7 @@ def way_to_share(now: Context) -> Tensor:
     """
     known = _known(now)
     forecast = now.forecast if known.assumed is now.state else now.world.forecast(known.assumed)
-    cells, burns = _fires(now)
+    cells, burns = _fires(now, known.assumed)
     risk = forecast.fire_risk().flatten(1).gather(1, cells)
     moves = moves_between(known.place, *rows_and_columns(cells, known.assumed))
     own = fire_front(burns, risk)[:, None] & _is_nearest(moves, known, now.world.team)
@@ -103,7 +103,7 @@ class _Known(NamedTuple):
 
 def _known(now: Context) -> _Known:
     state, world = now.state, now.world
-    assumed, place = now.assumed, state.vehicles.position
+    assumed, place = now.assumed if world.sensing.is_limited else state, state.vehicles.position
     if len(assumed.key) == len(place):
         return _Known(assumed, place, on_scene(state), 1)
     agents, (known, told) = place.shape[1], world.sensing.knows_where(state, world.team, world.hearing)
@@ -112,10 +112,10 @@ def _known(now: Context) -> _Known:
     return _Known(assumed, places.flatten(0, 1), (known | self).flatten(0, 1), agents)
 
 
-def _fires(now: Context) -> tuple[Tensor, Tensor]:
+def _fires(now: Context, assumed: WorldState) -> tuple[Tensor, Tensor]:
     """Return the fires that can be put out, flat indices int64 [R, K], and which are no padding, bool [R, K]."""
     if "fires" not in now.kept:
-        fire = can_be_put_out(now.assumed, now.world)
+        fire = can_be_put_out(assumed, now.world)
         now.kept["fires"] = first_cells(fire, fire[0].numel())
     cells, burns = now.kept["fires"]
     return cells, burns
