@@ -28,6 +28,20 @@ def test_every_world_is_played_to_its_own_end(make_small_env):
     assert ((episodes["control_time"] == 1.0) | (episodes["burning"] == 0.0)).all()
 
 
+def test_a_long_play_says_how_far_it_is(make_small_env, monkeypatch, caplog):
+    monkeypatch.setattr(play_module, "_SECONDS", -1.0)
+    env = make_small_env(n_worlds=3)
+    random = Random(env)
+    random.is_stateful = True  # so that it plays step by step
+    with caplog.at_level("INFO", "warp_torchrl"):
+        play(env, random, 100)
+    assert f"step 1 of {env.world.horizon} at most: 0 of 3 episodes have ended" in caplog.messages
+    monkeypatch.setattr(play_module, "_SECONDS", 60.0)
+    caplog.clear()
+    play(env, random, 100)
+    assert not caplog.messages
+
+
 def test_the_report_has_what_the_contract_says(make_small_env, tmp_path):
     env = make_small_env(3)
     mine, noop = play(env, Random(env), 9), play(env, NoOp(env), 9)

@@ -1,6 +1,8 @@
 """Paired evaluation: every policy plays the same worlds, on seeds outside of training."""
 
+import logging
 from collections.abc import Sequence
+from time import monotonic
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -22,11 +24,15 @@ from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.world import World
 
+log = logging.getLogger("warp_torchrl")
+
 BASELINES = ("noop", "random", "local", "greedy", "coordinated")
 """Baselines of every table."""
 SEARCHING = ("oldest", "lawnmower", "follower")
 """Those that are there too where agents know what was seen alone."""
 
+_SECONDS = 60.0
+"""Between two lines about episodes that take long."""
 _CELLS_ABREAST = 2**21
 """Of the worlds of all heuristics that play in one batch; more take much memory, and gain nothing."""
 
@@ -109,14 +115,19 @@ def _steps(
     """Play step by step, for any policy, and return the metrics [B]."""
     watcher = env.watcher
     env.watcher = watcher if behaviour is None else behaviour
-    for _ in range(env.world.horizon):
+    told = monotonic()
+    for step in range(1, env.world.horizon + 1):
         if recorder is not None:
             recorder.add(env.shared_state)
         acted = policy(now)
         check_scores(scores(acted))  # here each step reads from the device anyway
         now = env.step(acted)["next"]
-        if now["done"].all():
+        ended = int(now["done"].sum())
+        if ended == len(now["done"]):
             break
+        if monotonic() - told > _SECONDS:
+            log.info("step %d of %d at most: %d of %d episodes have ended", step, env.world.horizon, ended, len(now))
+            told = monotonic()
     if recorder is not None:
         recorder.add(env.shared_state)
     env.watcher = None
