@@ -3,20 +3,12 @@
 import torch
 
 from tests.world.drawing import differing, draw
-from warp_torchrl.world.backends.edge import AtEdge, places
+from warp_torchrl.world.backends.edge import AtEdge
 from warp_torchrl.world.backends.table import bit_of
 from warp_torchrl.world.backends.tick import advance
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.world import World
-
-
-def test_places_are_found_word_by_word() -> None:
-    generator = torch.Generator().manual_seed(0)
-    for count in (0, 1, 7, 8, 63, 64, 4096, 4097):
-        for share in (0.0, 0.03, 1.0):
-            codes = (torch.rand(count, generator=generator) < share).to(torch.uint8) * 131
-            assert places(codes).tolist() == [index for index, code in enumerate(codes.tolist()) if code]
 
 
 def test_an_edge_by_hand() -> None:

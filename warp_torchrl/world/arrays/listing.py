@@ -8,6 +8,7 @@ from warp_torchrl.system.device import needs_no_sync
 VECTORS = 64
 """What the length of a list is a multiple of where its numbers must not depend on the batch: some of torch's operations
 (pow, atan2) round otherwise in a last part that does not fill their vectors."""
+_WORD = 8  # bytes
 
 
 def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
@@ -36,8 +37,21 @@ def flat_cells(mask: Tensor) -> Tensor:
     On a device that would have to synchronise, every cell.
     """
     if needs_no_sync(mask.device):
-        return mask.flatten().nonzero()[:, 0]
+        return places(mask.flatten().view(torch.uint8))
     return torch.arange(mask.numel(), device=mask.device)
+
+
+def places(codes: Tensor) -> Tensor:
+    """Return where codes are not 0, int64 [N]; codes are uint8 [n].
+
+    Most words of eight codes hold none, and are passed over as words.
+    """
+    if codes.numel() % _WORD:
+        return codes.nonzero()[:, 0]
+    words = codes.view(torch.int64)
+    word = words.nonzero()[:, 0]
+    found = words.index_select(0, word).view(torch.uint8).nonzero()[:, 0]
+    return word.index_select(0, found >> 3).mul_(_WORD).add_(found & (_WORD - 1))
 
 
 def in_all(cell: Tensor, count: int) -> Tensor:

@@ -21,7 +21,7 @@ from warp_torchrl.world.backends.on_demand import on_demand
 from warp_torchrl.world.backends.planes import WholeMaps
 from warp_torchrl.world.backends.table import Tabled, pattern_table
 from warp_torchrl.world.backends.turning import in_air
-from warp_torchrl.world.law.arrivals import RATE, Beds, terms_of
+from warp_torchrl.world.law.arrivals import RATE
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.law.fire import Fire, Gains, Slopes
 from warp_torchrl.world.law.hazard import HazardFire
@@ -95,18 +95,10 @@ def forecast(fire: Automaton, state: WorldState) -> Forecast:
     )
 
 
-def air(fire: Automaton, wind: Tensor, moisture: Tensor | None, ground: Ground, beds: Beds | None = None) -> Air:
-    """Return a wind with all that follows from it on some ground.
-
-    Args:
-        fire: The automaton.
-        wind: See ``Automaton.air``.
-        moisture: See ``Automaton.air``.
-        ground: Of the worlds.
-        beds: Of the moisture under law ``rate``, where they are made; None makes them.
-    """
+def air(fire: Automaton, wind: Tensor, moisture: Tensor | None, ground: Ground) -> Air:
+    """Return a wind with all that follows from it on some ground; the arguments are those of ``Automaton.air``."""
     if type(fire) is RateFire and fire.wind_wanders and _may_read(wind.device):
-        return on_demand(fire, wind, moisture, ground, beds)
+        return on_demand(fire, wind, moisture, ground)
     made = fire.air(wind, moisture, ground)
     if not isinstance(fire, Fire) or type(fire) not in COVERED:
         return made
@@ -132,8 +124,7 @@ def in_wind(fire: Automaton, state: WorldState, wind: Tensor, moisture: Tensor |
     rows = state[index]
     damp = None if moisture is None else moisture[index]
     turned = in_air if type(fire) is RateFire else type(fire).in_air
-    beds = terms_of(rows.air).beds if moisture is old.moisture else None
-    changed = turned(fire, rows, air(fire, wind[index], damp, rows.ground, beds)).leaves()
+    changed = turned(fire, rows, air(fire, wind[index], damp, rows.ground)).leaves()
     leaves = state.leaves()
     put = {name: leaves[name].index_copy(0, index, leaf) for name, leaf in changed.items() if _follows_air(name)}
     return state.with_leaves({**leaves, **put})

@@ -11,10 +11,10 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from warp_torchrl.system.modes import kept
-from warp_torchrl.world.arrays.bytes import above, byte
+from warp_torchrl.world.arrays.bytes import above
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
+from warp_torchrl.world.arrays.listing import flat_cells
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.backends.edge import places
 from warp_torchrl.world.backends.planes import is_fuel, spreads
 from warp_torchrl.world.law.arrivals import Arrivals, arrivals_in, beside, is_waiting, known, metric_at, sources
 from warp_torchrl.world.law.rate import RateFire
@@ -53,13 +53,13 @@ class AtBand:
         burns = spreads(self.fire, state)
         fuel = is_fuel(self.fire, state) & above(state.alpha, 0.0)
         near = beside(burns, fuel, self._kindled(state, fuel))
-        return band_of(places(byte(near).flatten()), state, burns, fuel)
+        return band_of(flat_cells(near), state, burns, fuel)
 
     def _kindled(self, state: WorldState, fuel: Tensor) -> Tensor:
         """Return what ``arrivals.kindled`` does."""
         kept, now = arrivals_in(state), self.fire.now(state)
         waits = is_waiting(kept, now, fuel)
-        cell = places(byte(waits).flatten())
+        cell = flat_cells(waits)
         slowness, _, _ = metric_at(state.ground, state.air, cell)
         soon = kindling(kept.minutes.flatten().index_select(0, cell), slowness) <= of_world(now, cell, state)
         return torch.zeros_like(waits).flatten().scatter_(0, cell, soon).view_as(waits)

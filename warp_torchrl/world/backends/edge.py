@@ -15,14 +15,13 @@ from torch import Tensor
 from warp_torchrl.system.modes import kept
 from warp_torchrl.world.arrays.bytes import byte, index_put
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
+from warp_torchrl.world.arrays.listing import places
 from warp_torchrl.world.arrays.random import Stream, uniform_among
 from warp_torchrl.world.backends.join import Joining, in_place
 from warp_torchrl.world.backends.planes import age_fires, is_fuel, spreads
 from warp_torchrl.world.backends.table import BESIDE, bits, burning_neighbours, table_in
 from warp_torchrl.world.law.fire import Fire, slope_in
 from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
-
-_WORD = 8  # bytes
 
 
 class AtEdge:
@@ -230,16 +229,3 @@ def expected_from_edge(edge: Edge, probabilities: EdgeProbabilities) -> Tensor:
     total = torch.zeros(edge.shape.numel() + 2 * margin, device=edge.cell.device)
     total.scatter_add_(0, (edge.source + margin).flatten(), (edge.burns * probabilities.alone()).flatten())
     return total[margin:-margin].view(edge.shape)
-
-
-def places(codes: Tensor) -> Tensor:
-    """Return where codes are not 0, int64 [N]; codes are uint8 [n].
-
-    Most words of eight codes hold none, and are passed over as words.
-    """
-    if codes.numel() % _WORD:
-        return codes.nonzero()[:, 0]
-    words = codes.view(torch.int64)
-    word = words.nonzero()[:, 0]
-    found = words.index_select(0, word).view(torch.uint8).nonzero()[:, 0]
-    return word.index_select(0, found >> 3).mul_(_WORD).add_(found & (_WORD - 1))

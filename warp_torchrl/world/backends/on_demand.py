@@ -10,7 +10,7 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from warp_torchrl.world.arrays.listing import filled
-from warp_torchrl.world.law.arrivals import Beds, Terms, terms_of
+from warp_torchrl.world.law.arrivals import Terms, terms_of
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import travel
 from warp_torchrl.world.state.state import Air, Ground
@@ -51,17 +51,9 @@ class OnDemand(Terms):
         return made[0, :, 0, : len(cell)]
 
 
-def on_demand(fire: RateFire, wind: Tensor, moisture: Tensor | None, ground: Ground, beds: Beds | None = None) -> Air:
-    """Return a wind with its terms on demand.
-
-    Args:
-        fire: The automaton.
-        wind: See ``Automaton.air``.
-        moisture: See ``Automaton.air``.
-        ground: Of the worlds.
-        beds: Of the moisture, where they are made; None makes them.
-    """
+def on_demand(fire: RateFire, wind: Tensor, moisture: Tensor | None, ground: Ground) -> Air:
+    """Return a wind with its terms on demand; the arguments are those of ``Automaton.air``."""
     air, shape = Air(wind, moisture), ground.alpha.shape
     made = torch.zeros(shape[0], 3, *shape[1:], device=wind.device)
     known = torch.zeros(shape, dtype=torch.bool, device=wind.device)
-    return air.replace(terms=OnDemand(fire.beds_in(air) if beds is None else beds, fire, made, known))
+    return air.replace(terms=OnDemand(fire.beds_in(air), fire, made, known))

@@ -3,10 +3,10 @@
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.arrays.bytes import above, byte
+from warp_torchrl.world.arrays.bytes import above
 from warp_torchrl.world.arrays.geometry import grow
+from warp_torchrl.world.arrays.listing import flat_cells
 from warp_torchrl.world.backends.band import Band, band_of, of_world, padded
-from warp_torchrl.world.backends.edge import places
 from warp_torchrl.world.backends.planes import is_fuel, spreads
 from warp_torchrl.world.law.arrivals import RATE, Arrivals, arrivals_in, is_waiting, metric_at, own_cell
 from warp_torchrl.world.law.rate import RateFire
@@ -25,8 +25,8 @@ def in_air(fire: RateFire, state: WorldState, air: Air) -> WorldState:
     burns, fuel = spreads(fire, state), is_fuel(fire, state) & above(state.alpha, 0.0)
     kept, now = arrivals_in(state), fire.now(state)
     waits = is_waiting(kept, now, fuel)
-    trees = band_of(_places(waits | (grow(burns) & fuel)), state, burns, fuel)
-    metric_at(state.ground, air, _places(grow(burns | waits)))  # at once all that the next tick needs
+    trees = band_of(flat_cells(waits | (grow(burns) & fuel)), state, burns, fuel)
+    metric_at(state.ground, air, flat_cells(grow(burns | waits)))  # at once all that the next tick needs
     before, after = (metric_at(state.ground, each, trees.cell) for each in (state.air, air))
     changes = differ(before, after)
 
@@ -46,16 +46,12 @@ def in_air(fire: RateFire, state: WorldState, air: Air) -> WorldState:
     ratio = torch.where(changes, least_ratio(before, after), 1.0)
     ratios = torch.ones_like(kept.minutes).flatten().scatter_(0, trees.cell, ratio).view_as(fuel)
     turned = torch.zeros_like(fuel).flatten().scatter_(0, trees.cell, changes).view_as(fuel)
-    sources = band_of(_places(burns & grow(turned)), state, burns, fuel)
+    sources = band_of(flat_cells(burns & grow(turned)), state, burns, fuel)
     times, least = minutes.index_select(0, sources.cell), _about(ratios, torch.inf, sources).amin(0)
     minutes.index_copy_(0, sources.cell, since(times, of_world(now, sources.cell, state), least))
     origin.index_copy_(0, sources.cell, own.index_select(0, sources.cell))
     arrivals = Arrivals(minutes.view_as(kept.minutes), origin.view_as(kept.origin))
     return state.replace(air=air).with_planes(RATE, arrivals)
-
-
-def _places(mask: Tensor) -> Tensor:
-    return places(byte(mask).flatten())
 
 
 def _about(plane: Tensor, beyond: float, band: Band) -> Tensor:

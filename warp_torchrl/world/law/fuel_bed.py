@@ -29,7 +29,7 @@ from warp_torchrl.world.behaviour.rothermel import BedResponse, bed_response
 from warp_torchrl.world.behaviour.spread import Spread
 from warp_torchrl.world.behaviour.surface import head_of_fire, surface_spread
 from warp_torchrl.world.law.canopy import crowns_of, lack_of_canopy, to_midflame
-from warp_torchrl.world.law.listed import bearing, gradient
+from warp_torchrl.world.law.listed import gradient
 from warp_torchrl.world.law.mapped_fuel import check_codes
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.terrain.source import LandscapeSource
@@ -286,6 +286,11 @@ def _on_map(direction: Tensor, rise: Tensor) -> Tensor:
     angle = torch.deg2rad(direction)
     climb = rise[:, 0] * angle.sin() + rise[:, 1] * angle.cos()
     return torch.rsqrt(1.0 + climb * climb)
+
+
+def bearing(east: Tensor, north: Tensor) -> Tensor:
+    """Return where a vector points, degrees clockwise from grid north in [0, 360)."""
+    return torch.rad2deg(torch.atan2(east, north + (north == 0.0) * (east == 0.0))) % 360.0
 
 
 def _of_cells(moisture: Tensor, world: Tensor | None = None) -> Tensor:

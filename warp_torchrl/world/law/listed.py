@@ -55,8 +55,3 @@ def listed(landscape: Landscape, cell: Tensor) -> Landscape:
     planes = {"cover": landscape.cover, "age": landscape.age, **landscape.layers.held}
     own = {name: plane.reshape(len(cell), -1).gather(1, cell)[:, None] for name, plane in planes.items()}
     return Landscape(own.pop("cover"), own.pop("age"), None, layers=Named(own))
-
-
-def bearing(east: Tensor, north: Tensor) -> Tensor:
-    """Return where a vector points, degrees clockwise from grid north in [0, 360)."""
-    return torch.rad2deg(torch.atan2(east, north + (north == 0.0) * (east == 0.0))) % 360.0

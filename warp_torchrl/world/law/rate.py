@@ -1,7 +1,7 @@
 """The automaton in metres and minutes: fires that spread at the rates of a fuel model."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import torch
@@ -15,7 +15,7 @@ from warp_torchrl.world.behaviour.moistures import fine_moisture, in_force, mois
 from warp_torchrl.world.behaviour.rothermel import BedResponse
 from warp_torchrl.world.behaviour.spread import Spread
 from warp_torchrl.world.law import arrivals
-from warp_torchrl.world.law.arrivals import RATE, Arrivals, Beds, Paces, Terms, Travel, arrivals_in, metric, own_cell
+from warp_torchrl.world.law.arrivals import RATE, Arrivals, Beds, Paces, Travel, arrivals_in, metric, own_cell, terms_of
 from warp_torchrl.world.law.automaton import Beside, at_cells
 from warp_torchrl.world.law.cells import is_burning, is_tree
 from warp_torchrl.world.law.listed import gradient_at, listed
@@ -71,13 +71,12 @@ class RateFire(RateOptions):
         """
         if self.acceleration:
             raise ValueError("fire.acceleration must be false in worlds that step: warp predict and calibrate read it")
-        law = self.on(landscape)
-        law = law._told(_by_cover=law._by_cover, _wind_wanders=wind.wanders)
+        law = self.on(landscape)._changed(_wind_wanders=wind.wanders)
         if law.minutes_per_tick is not None:
             return law
         fastest = law.bed.fastest(landscape, wind, cell_size, moisture_row(law.moisture))
         minutes = min(60.0, max(0.05, float(f"{cell_size / fastest / TICKS_PER_CELL:.2g}")))
-        return replace(law, minutes_per_tick=minutes)._told(_by_cover=law._by_cover, _wind_wanders=wind.wanders)
+        return law._changed(minutes_per_tick=minutes)
 
     def flammability(self, landscape: Landscape) -> Tensor:
         """Return the square root of the rate on level ground in a wind of 5 m/s, of the fastest fuel's there."""
@@ -146,9 +145,9 @@ class RateFire(RateOptions):
         first = 2 * world if places == 1 else world * places + cell
         wind = torch.stack([wind.flatten()[first + part * places] for part in (0, 1)], dim=1)[:, :, None]
         rise = gradient_at(landscape.elevation, landscape.cover, size, cell)[:, :, None]
-        beds = air.terms.beds if isinstance(air.terms, Terms) else self.beds_in(air)
-        response = None if beds is None else BedResponse(**vars(beds))
-        return self.bed.spread(listed(landscape, cell), wind, self._damp(air), size, rise, world=world, beds=response)
+        made = terms_of(air).beds
+        beds = None if made is None else BedResponse(**vars(made))
+        return self.bed.spread(listed(landscape, cell), wind, self._damp(air), size, rise, world=world, beds=beds)
 
     def fine_moisture(self, air: Air) -> Tensor:
         """Return the moisture of fine dead fuel, float32 [B] [%]."""

@@ -126,7 +126,7 @@ class RateOptions(Automaton):
         Raises:
             ValueError: If the fuel codes of the landscape are of another model, or the model lacks some.
         """
-        law = self._told(_by_cover=self.fuel_of_cover is not None and has_own_table(landscape))
+        law = self._changed(_by_cover=self.fuel_of_cover is not None and has_own_table(landscape))
         law.bed.check(landscape)
         return law
 
@@ -144,21 +144,22 @@ class RateOptions(Automaton):
 
     def alike(self) -> Self:
         """Return the law under which fires differ from cell to cell alone."""
-        return replace(self, fire_deviation=0.0)._told(_by_cover=self._by_cover, _wind_wanders=self._wind_wanders)
+        return self._changed(fire_deviation=0.0)
 
     def with_state(self, **state: Any) -> Self:
         """Return the law with another state of its fuel: ``curing``, ``green``, ``foliar_moisture``."""
-        return replace(self, **state)._told(_by_cover=self._by_cover, _wind_wanders=self._wind_wanders)
+        return self._changed(**state)
 
     @property
     def wind_wanders(self) -> bool:
         """Return whether the wind of the worlds changes with every tick."""
         return self._wind_wanders
 
-    def _told(self, **told: bool) -> Self:
-        """Return the law with marks of its worlds: ``_by_cover``, ``_wind_wanders``."""
-        law = replace(self)
-        for name, value in told.items():
+    def _changed(self, **changes: Any) -> Self:
+        """Return the law with other values. ``_by_cover`` and ``_wind_wanders`` stay unless they are given."""
+        marks = {name: changes.pop(name, getattr(self, name)) for name in ("_by_cover", "_wind_wanders")}
+        law = replace(self, **changes)
+        for name, value in marks.items():
             object.__setattr__(law, name, value)
-        law.__dict__.pop("bed")  # made before it was told
+        law.__dict__.pop("bed")  # made without the marks
         return law

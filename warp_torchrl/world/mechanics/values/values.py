@@ -185,7 +185,7 @@ class Values(Mechanic):
         exposure, area = state.planes(self.name, Exposure), _area(state)
         held = exposure.held | state.terminated
         return {
-            "worth_saved": exposure.left,
+            "worth_saved": exposure.left.clone(),
             "escaped": (area > self.escape_area).to(torch.float32),
             "contained": held.to(torch.float32),
             "contained_at": torch.where(held, exposure.grew, exposure.now),
