@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 import shutil
 import signal
 from copy import deepcopy
@@ -501,8 +502,9 @@ def test_a_run_starts_from_an_exported_policy_with_a_critic_of_its_own(finished,
 def test_networks_of_another_kind_are_no_start(finished, tmp_path, change):
     training = tiny(tmp_path, change)
     before = flattened(training.state_dict())
-    with pytest.raises(CheckpointError, match="was trained by another algorithm or other networks"):
+    with pytest.raises(CheckpointError, match="was trained by another algorithm or other networks") as refusal:
         training.start_from(newest(finished[0])[0])
+    assert re.search(r": \S+ is (\[[\d, ]+\]|missing) there, (\[[\d, ]+\]|missing) here$", str(refusal.value))
     assert all(torch.equal(value, before[name]) for name, value in flattened(training.state_dict()).items()
                if isinstance(value, torch.Tensor))  # fmt: skip
 
