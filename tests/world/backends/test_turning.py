@@ -66,6 +66,17 @@ def test_cells_are_made_once_in_any_order_and_company() -> None:
     assert again[1].item() == pytest.approx(world.fire.pace(state.key, (24, 24)).flatten()[7].item())
 
 
+def test_worlds_of_inference_mode_go_on_outside_of_it() -> None:
+    world = world_of(LAWS["rothermel"])
+    actions = torch.zeros(5, world.team.n_agents, dtype=torch.int64)
+    with torch.inference_mode():
+        begun = worlds(world)
+    ours, theirs = (world.step(state, actions).after for state in (begun, worlds(world)))
+    assert torch.equal(arrivals_in(ours).minutes, arrivals_in(theirs).minutes)
+    for one, other in zip(metric(begun.ground, begun.air), metric(theirs.ground, worlds(world).air), strict=True):
+        assert torch.equal(one, other)
+
+
 def test_what_the_wind_makes_is_kept_where_it_lasts_or_nothing_is_read() -> None:
     fire = LAWS["rothermel"]
     assert isinstance(worlds(world_of(fire, Uniform(speed=7.0))).air.terms, Travel)

@@ -26,11 +26,14 @@ class OnDemand(Terms):
 
     def on(self, ground: Ground, air: Air) -> Tensor:
         """See ``Terms``."""
-        if not bool(self.known.all()):
-            whole = self.fire.air(air.wind, air.moisture, ground)
-            self.made.copy_(terms_of(whole).on(ground, whole))
+        if bool(self.known.all()):
+            return self.made
+        whole = self.fire.air(air.wind, air.moisture, ground)
+        made = terms_of(whole).on(ground, whole)
+        if self._is_open:
+            self.made.copy_(made)
             self.known.fill_(True)
-        return self.made
+        return made
 
     def at(self, ground: Ground, air: Air, cell: Tensor) -> Tensor:
         """See ``Terms``."""
@@ -38,12 +41,19 @@ class OnDemand(Terms):
         planes, known = self.made.view(-1), self.known.view(-1)
         places = cell + 2 * count * cell.div(count, rounding_mode="floor")
         new = (~known.index_select(0, cell)).nonzero()[:, 0]
+        if len(new) and not self._is_open:
+            return self._make(ground, air, cell)
         if len(new):
             made = self._make(ground, air, cell.index_select(0, new))
             for part in range(3):
                 planes.index_copy_(0, places.index_select(0, new) + part * count, made[part])
             known.index_fill_(0, cell.index_select(0, new), True)
         return torch.stack([planes.index_select(0, places + part * count) for part in range(3)])
+
+    @property
+    def _is_open(self) -> bool:
+        """Return whether terms can be kept; outside of inference mode, tensors that were made in it are closed."""
+        return torch.is_inference_mode_enabled() or not self.made.is_inference()
 
     def _make(self, ground: Ground, air: Air, cell: Tensor) -> Tensor:
         spread = self.fire.spread_at(ground, air, pad(cell, (0, filled(len(cell)) - len(cell))))

@@ -117,9 +117,11 @@ class RateFire(RateOptions):
 
     def air(self, wind: Tensor, moisture: Tensor | None, ground: Ground) -> Air:
         """See ``Automaton``."""
-        spread = self.bed.spread(ground.landscape, wind, self._damp(Air(wind, moisture)), ground.cell_size)
+        air = Air(wind, moisture)
+        beds = self.beds_in(air)
+        spread = self.bed.spread(ground.landscape, wind, self._damp(air), ground.cell_size, beds=_response(beds))
         made = travel(spread.head, spread.direction, spread.length_to_breadth, ground.cell_size)
-        return Air(wind, moisture, Travel(self.beds_in(Air(wind, moisture)), made))
+        return air.replace(terms=Travel(beds, made))
 
     def head_at(self, state: WorldState, cell: Tensor) -> Spread:
         """Return the behaviour of the fire's head in some cells now, float32 [B, 1, n] each; cell is int64 [B, n]."""
@@ -145,8 +147,7 @@ class RateFire(RateOptions):
         first = 2 * world if places == 1 else world * places + cell
         wind = torch.stack([wind.flatten()[first + part * places] for part in (0, 1)], dim=1)[:, :, None]
         rise = gradient_at(landscape.elevation, landscape.cover, size, cell)[:, :, None]
-        made = terms_of(air).beds
-        beds = None if made is None else BedResponse(**vars(made))
+        beds = _response(terms_of(air).beds)
         return self.bed.spread(listed(landscape, cell), wind, self._damp(air), size, rise, world=world, beds=beds)
 
     def fine_moisture(self, air: Air) -> Tensor:
@@ -267,6 +268,10 @@ class RateFire(RateOptions):
             if getattr(after, name) is not None
         }
         return after.replace(**kept)
+
+
+def _response(beds: Beds | None) -> BedResponse | None:
+    return None if beds is None else BedResponse(**vars(beds))
 
 
 def _log_normal(u: Tensor, variation: float) -> Tensor:
