@@ -52,6 +52,23 @@ def test_a_fire_turns_as_on_whole_maps_to_the_bit(name: str) -> None:
     assert turned > 1000
 
 
+@pytest.mark.parametrize("turning", [1, 4])
+def test_worlds_turn_alike_where_few_of_them_and_where_most_do(turning: int) -> None:
+    world = world_of(LAWS["rothermel"])
+    state = worlds(world)
+    for _ in range(10):
+        state = world.step(state, torch.zeros(5, world.team.n_agents, dtype=torch.int64)).after
+    wind = state.wind.clone()
+    wind[:turning] += 3.0
+    ours, theirs = backend.in_wind(world.fire, state, wind, None), in_whole_air(state, world.fire, wind)
+    for part in ("minutes", "origin"):
+        assert torch.equal(getattr(arrivals_in(ours), part), getattr(arrivals_in(theirs), part))
+    for one, other in zip(metric(ours.ground, ours.air), metric(theirs.ground, theirs.air), strict=True):
+        assert torch.equal(one, other)
+    assert not torch.equal(arrivals_in(ours).minutes[0], arrivals_in(state).minutes[0])
+    assert torch.equal(arrivals_in(ours).minutes[turning:], arrivals_in(state).minutes[turning:])
+
+
 def test_cells_are_made_once_in_any_order_and_company() -> None:
     world = world_of(LAWS["rothermel"])
     state = worlds(world)

@@ -18,6 +18,9 @@ is_fused = torch.compiler.is_dynamo_compiling
 """Return whether the calling function is being fused. A step of one world calls it some eighty times, and
 ``torch.compiler.is_compiling`` takes twice as long."""
 
+constant = torch.compiler.assume_constant_result
+"""Return a function that fused ones call once, as they are compiled: what it returns follows from its arguments."""
+
 _OPERATORS = torch.library.Library("warp_torchrl", "FRAGMENT")
 _FUNCTIONS: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {}
 """Of each operator by name: what it computes, and what tells its result's shape."""

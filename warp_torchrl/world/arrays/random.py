@@ -12,6 +12,7 @@ from zlib import crc32
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.arrays.compile import constant
 from warp_torchrl.world.arrays.counting import counting
 from warp_torchrl.world.arrays.hashing import mixed, splitmix64
 
@@ -87,7 +88,12 @@ def named_key(key: Tensor, name: str) -> Tensor:
     Returns:
         int64 [B].
     """
-    return splitmix64(_counted(key, crc32(name.encode()), Stream.NAMED))
+    return splitmix64(_counted(key, _number_of(name), Stream.NAMED))
+
+
+@constant
+def _number_of(name: str) -> int:
+    return crc32(name.encode())
 
 
 def uniform(key: Tensor, tick: Tensor | int, stream: Stream, shape: tuple[int, ...]) -> Tensor:

@@ -121,9 +121,11 @@ def in_wind(fire: Automaton, state: WorldState, wind: Tensor, moisture: Tensor |
     index = differs.nonzero()[:, 0]
     if not len(index):
         return state
+    turned = in_air if type(fire) is RateFire else type(fire).in_air
+    if 2 * len(index) > len(differs):  # to copy their rows takes longer
+        return turned(fire, state, air(fire, wind, moisture, state.ground))
     rows = state[index]
     damp = None if moisture is None else moisture[index]
-    turned = in_air if type(fire) is RateFire else type(fire).in_air
     changed = turned(fire, rows, air(fire, wind[index], damp, rows.ground)).leaves()
     leaves = state.leaves()
     put = {name: leaves[name].index_copy(0, index, leaf) for name, leaf in changed.items() if _follows_air(name)}

@@ -11,15 +11,16 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from warp_torchrl.system.modes import kept
-from warp_torchrl.world.arrays.bytes import above
+from warp_torchrl.world.arrays.bytes import above, equal, index_put
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.arrays.listing import flat_cells
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.backends.planes import is_fuel, spreads
-from warp_torchrl.world.law.arrivals import Arrivals, arrivals_in, beside, is_waiting, known, metric_at, sources
+from warp_torchrl.world.backends.planes import age_fires, is_fuel, spreads
+from warp_torchrl.world.law.arrivals import RATE, Arrivals, arrivals_in, beside, is_waiting, known, metric_at, sources
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER, NOWHERE, Places, arrival, kindling, rate_from
-from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.state.cells import is_tree
+from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
 
 
 class AtBand:
@@ -35,10 +36,37 @@ class AtBand:
     def tick(self, state: WorldState, ticks_now: Tensor) -> WorldState:
         """Return the worlds after one tick of the fire with their own draws, in the worlds that tick now, bool [B]."""
         fire = self.fire
-        draws = fire.growth or fire.beta > 0.0 or fire.p_regrow > 0.0
+        if not (fire.growth or fire.beta > 0.0 or fire.p_regrow > 0.0):
+            return self._tick_alone(state, ticks_now)
         size = (state.cells.shape[1], state.cells.shape[2])
-        u = uniform(state.key, state.tick, Stream.FIRE, size) if draws else torch.zeros_like(state.alpha)
+        u = uniform(state.key, state.tick, Stream.FIRE, size)
         return fire.tick_to(state, u, ticks_now, self.next_arrivals(state))
+
+    def _tick_alone(self, state: WorldState, ticks_now: Tensor) -> WorldState:
+        """Return what ``tick`` does where trees neither grow nor ignite by themselves."""
+        fire, band, here = self.fire, self._band(state), ticks_now[:, None, None]
+        minutes, origin = self._times(state, band)
+        ticking = of_world(here, band.cell, state)
+        lit = band.cell[ticking & (minutes <= of_world(fire.now(state.replace(tick=state.tick + 1)), band.cell, state))]
+        after = self._held(state, _lit(age_fires(fire, state, ticks_now), state.cells, lit))
+
+        kept, trees, comes = arrivals_in(state), is_tree(state.cells) & here, ticking.nonzero()[:, 0]
+        times, origins = torch.where(trees, NEVER, kept.minutes), torch.where(trees, NOWHERE, kept.origin)
+        arrivals = Arrivals(_put(times, band.cell, minutes, comes), _put(origins, band.cell, origin, comes))
+        return after.with_planes(RATE, arrivals)
+
+    def _held(self, before: WorldState, after: WorldState) -> WorldState:
+        """Return what ``RateFire._held`` does."""
+        ends = equal(before.cells, self.fire.last_spreading) & (after.cells != before.cells)
+        fuel = is_fuel(self.fire, after) & above(after.alpha, 0.0)
+        band = band_of(flat_cells(ends), after, ends, fuel)
+        holds = band.cell[padded(fuel, 0).index_select(0, band.around.flatten()).view(8, -1).any(0)]
+        kept = {
+            name: index_put(getattr(after, name), holds, getattr(before, name).flatten().index_select(0, holds))
+            for name in ("cells", "age", "stage_age", "burned")
+            if getattr(after, name) is not None
+        }
+        return after.replace(**kept)
 
     def forecast(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """Return what ``RateFire.expected_ignitions`` and ``RateFire.ignition_probability`` do, float32 [B, H, W]."""
@@ -65,9 +93,15 @@ class AtBand:
         return torch.zeros_like(waits).flatten().scatter_(0, cell, soon).view_as(waits)
 
     def _arrivals(self, state: WorldState, band: "Band") -> Arrivals:
+        minutes, origin = self._times(state, band)
+        never, nowhere = torch.full_like(state.alpha, NEVER), torch.full(state.cells.shape, NOWHERE, dtype=torch.int32)
+        return Arrivals(index_put(never, band.cell, minutes), index_put(nowhere, band.cell, origin))
+
+    def _times(self, state: WorldState, band: "Band") -> tuple[Tensor, Tensor]:
+        """Return what ``Arrivals`` holds in the cells of a band, float32 and int32 [N]."""
         kept, times = arrivals_in(state), sources(state, self.fire.now(state), band.spreads, band.fuel)
         at_origin = known(state, times).flatten()
-        here, own = times.flatten().index_select(0, band.cell), band.row * state.cells.shape[2] + band.column
+        here, own = times.flatten().index_select(0, band.cell), band.own
         around = (padded(times, NEVER), padded(kept.origin, NOWHERE), padded(band.spreads, 0))
         times, origins, burning = (plane.index_select(0, band.around.flatten()).view(8, -1) for plane in around)
 
@@ -79,12 +113,7 @@ class AtBand:
         minutes = torch.maximum(minutes, of_world(self.fire.earliest(state), band.cell, state))
         holds = (kept.origin.flatten().index_select(0, band.cell) == own) & (here <= minutes)
         holds &= burning.any(0)
-        minutes, origin = torch.where(holds, here, minutes), torch.where(holds, own, origin)
-        never, nowhere = torch.full_like(kept.minutes, NEVER), torch.full_like(kept.origin, NOWHERE)
-        return Arrivals(
-            _put(never, band.cell, minutes),
-            _put(nowhere, band.cell, origin),
-        )
+        return torch.where(holds, here, minutes), torch.where(holds, own, origin)
 
     def _expected_ignitions(self, state: WorldState, band: "Band") -> Tensor:
         burns = padded(band.spreads, 0)
@@ -109,6 +138,11 @@ class Band:
     around: Tensor  # flat index of each neighbour in maps with a margin of one cell, int64 [8, N]
     spreads: Tensor  # the burning cells that ignite others, bool [B, H, W]
     fuel: Tensor  # the trees that can ignite, bool [B, H, W]
+
+    @property
+    def own(self) -> Tensor:
+        """Return the flat index of each cell in its map, int32 [N]."""
+        return self.row * self.spreads.shape[2] + self.column
 
 
 def band_of(cell: Tensor, state: WorldState, spreads: Tensor, fuel: Tensor) -> Band:
@@ -139,5 +173,15 @@ def of_world(values: Tensor, cell: Tensor, state: WorldState) -> Tensor:
     return values.flatten().index_select(0, cell.div(state.cells[0].numel(), rounding_mode="floor"))
 
 
-def _put(plane: Tensor, cell: Tensor, values: Tensor) -> Tensor:
-    return plane.flatten().scatter_(0, cell, values).view(plane.shape)
+def _put(plane: Tensor, cell: Tensor, values: Tensor, which: Tensor) -> Tensor:
+    """Return a plane that holds some of the values; the plane is used up."""
+    return index_put(plane, cell.index_select(0, which), values.index_select(0, which))
+
+
+def _lit(after: WorldState, trees: Tensor, cell: Tensor) -> WorldState:
+    """Return worlds in which trees have caught fire; what they were is uint8 [B, H, W], the cells int64 [N]."""
+    return after.replace(
+        cells=index_put(after.cells, cell, FIRST_FIRE),
+        age=index_put(after.age, cell, trees.flatten().index_select(0, cell)),
+        stage_age=None if after.stage_age is None else index_put(after.stage_age, cell, 0),
+    )

@@ -102,7 +102,7 @@ class WholeMaps:
         return in_place(self.fire.law).susceptibility(state.alpha) * number(is_fuel(self.fire, state))
 
 
-def age_fires(fire: Fire, state: WorldState, ticks_now: Tensor) -> WorldState:
+def age_fires(fire: Automaton, state: WorldState, ticks_now: Tensor) -> WorldState:
     """Return the worlds after a tick, in those that tick now, that ignites nothing and lets nothing grow.
 
     What it may yet ignite, ``cells``, ``age`` and ``stage_age``, is ``to_int32``.

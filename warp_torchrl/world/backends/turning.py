@@ -8,7 +8,7 @@ from warp_torchrl.world.arrays.geometry import grow
 from warp_torchrl.world.arrays.listing import flat_cells
 from warp_torchrl.world.backends.band import Band, band_of, of_world, padded
 from warp_torchrl.world.backends.planes import is_fuel, spreads
-from warp_torchrl.world.law.arrivals import RATE, Arrivals, arrivals_in, is_waiting, metric_at, own_cell
+from warp_torchrl.world.law.arrivals import RATE, Arrivals, arrivals_in, is_waiting, metric_at
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER, NOWHERE, differ, least_ratio, since, until
 from warp_torchrl.world.state.state import Air, WorldState
@@ -30,18 +30,14 @@ def in_air(fire: RateFire, state: WorldState, air: Air) -> WorldState:
     before, after = (metric_at(state.ground, each, trees.cell) for each in (state.air, air))
     changes = differ(before, after)
 
-    minutes, origin, own = (
-        kept.minutes.flatten().clone(),
-        kept.origin.flatten().clone(),
-        own_cell(state.cells).flatten(),
-    )
+    minutes, origin = kept.minutes.flatten().clone(), kept.origin.flatten().clone()
     times = minutes.index_select(0, trees.cell)
     around = _about(torch.where(burns | waits, kept.minutes, NEVER), NEVER, trees)
     comes = until(times, of_world(now, trees.cell, state), around, before, after)
     comes = torch.where(_about(burns, 0, trees).any(0), comes, NEVER)
     which = (waits.flatten().index_select(0, trees.cell) & changes).nonzero()[:, 0]
     _put(minutes, trees.cell, comes, which)
-    _put(origin, trees.cell, torch.where(comes == NEVER, NOWHERE, own.index_select(0, trees.cell)), which)
+    _put(origin, trees.cell, torch.where(comes == NEVER, NOWHERE, trees.own), which)
 
     ratio = torch.where(changes, least_ratio(before, after), 1.0)
     ratios = torch.ones_like(kept.minutes).flatten().scatter_(0, trees.cell, ratio).view_as(fuel)
@@ -49,7 +45,7 @@ def in_air(fire: RateFire, state: WorldState, air: Air) -> WorldState:
     sources = band_of(flat_cells(burns & grow(turned)), state, burns, fuel)
     times, least = minutes.index_select(0, sources.cell), _about(ratios, torch.inf, sources).amin(0)
     minutes.index_copy_(0, sources.cell, since(times, of_world(now, sources.cell, state), least))
-    origin.index_copy_(0, sources.cell, own.index_select(0, sources.cell))
+    origin.index_copy_(0, sources.cell, sources.own)
     arrivals = Arrivals(minutes.view_as(kept.minutes), origin.view_as(kept.origin))
     return state.replace(air=air).with_planes(RATE, arrivals)
 

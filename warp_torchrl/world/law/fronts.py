@@ -7,9 +7,9 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
+from warp_torchrl.world.arrays.listing import filled, flat_cells, in_all
 from warp_torchrl.world.law.arrivals import arrivals_in, pace_on
-from warp_torchrl.world.law.automaton import at_cells
-from warp_torchrl.world.law.passing import HeadBehaviour, head_behaviour, passing, steepness_from
+from warp_torchrl.world.law.passing import head_behaviour, passing, steepness_from
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER
 from warp_torchrl.world.state.state import WorldState
@@ -24,16 +24,29 @@ class Front(NamedTuple):
     flame_length: Tensor  # [m]
 
 
-def front_at(fire: RateFire, state: WorldState, cell: Tensor) -> Front:
-    """Return the front that came to some burning cells, int64 [B, n], in the air of now; see ``passing``."""
-    minutes, width = arrivals_in(state).minutes, state.cells.shape[2]
-    row, column = cell.div(width, rounding_mode="floor"), cell % width
-    padded = pad(minutes, (1, 1, 1, 1), value=NEVER).flatten(1)
-    own = (row + 1) * (width + 2) + column + 1
-    around = torch.stack([padded.gather(1, own + down * (width + 2) + right) for down, right in DIRECTIONS])
-    arrival = at_cells(minutes, cell)
-    then = head_behaviour(fire.head_at(state, cell))
-    heads = HeadBehaviour(*(each[:, 0] for each in (then.head, then.backing, then.intensity, then.flame_length)))
-    pace = at_cells(pace_on(state.ground), cell)
-    rate, intensity, flame_length = passing(steepness_from(around, arrival), pace, heads, state.ground.cell_size)
-    return Front(arrival, rate, intensity, flame_length)
+def front_at(fire: RateFire, state: WorldState, cell: Tensor, is_there: Tensor) -> Front:
+    """Return the front that came to some burning cells in the air of now; see ``passing``.
+
+    Args:
+        fire: The automaton.
+        state: The worlds.
+        cell: Flat indices in each map, int64 [B, n].
+        is_there: Which of them are meant, bool [B, n]; the others' front is 0 or that of the cell.
+    """
+    place = flat_cells(is_there)
+    cells = in_all(cell, state.cells[0].numel()).flatten().index_select(0, place)
+    found = _front_of(fire, state, pad(cells, (0, filled(len(cells)) - len(cells))))
+    none = torch.zeros(cell.numel(), device=cell.device)
+    return Front(*(none.index_copy(0, place, each[: len(cells)]).view_as(cell) for each in found))
+
+
+def _front_of(fire: RateFire, state: WorldState, cell: Tensor) -> tuple[Tensor, ...]:
+    """Return what ``Front`` holds, float32 [N] each, in some cells, flat indices in [B, H, W], int64 [N]."""
+    minutes, (_, height, width) = arrivals_in(state).minutes, state.cells.shape
+    line, column = cell.div(width, rounding_mode="floor"), cell % width
+    own = (line + 2 * line.div(height, rounding_mode="floor") + 1) * (width + 2) + column + 1
+    padded = pad(minutes, (1, 1, 1, 1), value=NEVER).flatten()
+    around = torch.stack([padded.index_select(0, own + down * (width + 2) + right) for down, right in DIRECTIONS])
+    arrival, pace = (plane.flatten().index_select(0, cell) for plane in (minutes, pace_on(state.ground)))
+    heads = head_behaviour(fire.spread_at(state.ground, state.air, cell).each(lambda of: of[0, 0]))
+    return arrival, *passing(steepness_from(around, arrival), pace, heads, state.ground.cell_size)

@@ -94,6 +94,11 @@ def test_embers_ignite_what_stands_where_they_fall():
     for _ in range(2):
         state = values.after_tick(state, torch.tensor([True]), world)
     state = values.after_tick(state, torch.tensor([False]), world)
+    among = state[torch.zeros(3, dtype=torch.int64)]  # one that does not tick among others that do
+    assert torch.equal(
+        values.after_tick(among, torch.tensor([True, False, True]), world)[1].planes("values", Exposure).left,
+        state[0].planes("values", Exposure).left,
+    )
     assert values.metrics(state)["worth_saved"].item() == pytest.approx((1 - 0.2 * 127 / 255) ** 2)
 
 
@@ -130,7 +135,7 @@ def test_under_law_rate_a_house_meets_the_front_as_it_came():
     values = Values(points=((1, 5, 1.0),))
     state, found = played(values, 12, drawing, ground, RATE)
     cell = torch.tensor([[1 * 8 + 5]])
-    flames = front_at(RATE, state, cell).flame_length
+    flames = front_at(RATE, state, cell, torch.ones_like(cell, dtype=torch.bool)).flame_length
     assert flames.item() > 0.5 and state.planes("values", Exposure).flames[0, 1, 5] == pytest.approx(flames.item())
     assert found["worth_saved"] == pytest.approx(1.0 - lost(flames, HOMES).item())
     assert found["contained_at"] <= 24.0 and not state.planes("values", Exposure).flames[0, 0].any()

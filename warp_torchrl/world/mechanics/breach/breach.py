@@ -111,5 +111,5 @@ class Breach(Mechanic):
         if not isinstance(fire, RateFire):
             return torch.where(burns, intensity_of(self.flame_length), none)
         cell, is_there = first_cells(burns, filled(state.cells[0].numel() // _SHARE))
-        found = torch.where(is_there, front_at(fire, state, cell).intensity, -torch.inf)
+        found = torch.where(is_there, front_at(fire, state, cell, is_there).intensity, -torch.inf)
         return none.flatten(1).scatter_reduce(1, cell, found, "amax").view_as(none)

@@ -3,7 +3,9 @@
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.arrays.bytes import above, below
 from warp_torchrl.world.arrays.constants import numbers
+from warp_torchrl.world.arrays.listing import flat_cells
 
 LEVELS = (0.6096, 1.2192, 1.8288, 2.4384, 3.6576)
 """Flame lengths that part the six fire intensity levels, 2, 4, 6, 8 and 12 ft [m] (Scott, Thompson and Calkin 2013)."""
@@ -29,6 +31,33 @@ def lost(flames: Tensor, losses: tuple[float, ...]) -> Tensor:
     """
     level = torch.bucketize(flames, numbers(LEVELS, flames.device), right=True)
     return numbers(losses, flames.device)[level] * (flames > 0.0)
+
+
+def kept(flames: Tensor, spared: Tensor, losses: tuple[float, ...]) -> Tensor:
+    """Return the share of its worth that flames and embers leave of each asset, float32.
+
+    Args:
+        flames: The longest that it was exposed to, float32 [m].
+        spared: Chance that no ember has ignited it, float32.
+        losses: See ``lost``.
+    """
+    return (1.0 - lost(flames, losses)) * spared
+
+
+def share_left(worth: Tensor, flames: Tensor, spared: Tensor, losses: tuple[float, ...]) -> Tensor:
+    """Return the share of each world's worth that flames and embers leave, float32 [B]; 1 where there was none.
+
+    Args:
+        worth: Of each cell before the fire, float32 [B, H, W].
+        flames: See ``kept``, [B, H, W].
+        spared: See ``kept``, [B, H, W].
+        losses: See ``lost``.
+    """
+    cell = flat_cells(above(worth, 0.0) & (above(flames, 0.0) | below(spared, 1.0)))
+    own, flames, spared = (plane.flatten().index_select(0, cell) for plane in (worth, flames, spared))
+    left = worth.flatten().index_copy(0, cell, own * kept(flames, spared, losses))
+    total, left = (each.view(len(worth), -1).sum(dim=1) for each in (worth, left))
+    return torch.where(total > 0.0, left / total.clamp(min=1e-30), 1.0)
 
 
 def longest_about(flames: Tensor, cells: int) -> Tensor:

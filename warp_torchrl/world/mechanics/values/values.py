@@ -9,10 +9,10 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields, did_you_mean
 from warp_torchrl.world.arrays.batch import Batch
-from warp_torchrl.world.arrays.bytes import above, between
+from warp_torchrl.world.arrays.bytes import above, at_least, between, byte
 from warp_torchrl.world.arrays.constants import numbers
 from warp_torchrl.world.arrays.geometry import grow
-from warp_torchrl.world.arrays.listing import filled
+from warp_torchrl.world.arrays.listing import filled, flat_cells
 from warp_torchrl.world.arrays.shortlist import first_cells
 from warp_torchrl.world.backends.backend import advance_rows
 from warp_torchrl.world.law.automaton import Automaton
@@ -22,7 +22,7 @@ from warp_torchrl.world.mechanics.mechanic import Mechanic, Metric, Rules
 from warp_torchrl.world.mechanics.minutes import check_minutes, minutes_of_tick
 from warp_torchrl.world.mechanics.table import mechanic
 from warp_torchrl.world.mechanics.values.assets import has_assets, worth_of_assets
-from warp_torchrl.world.mechanics.values.response import HOMES, RATES, longest_about, lost
+from warp_torchrl.world.mechanics.values.response import HOMES, RATES, kept, longest_about, share_left
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import OLDEST, WorldState
@@ -202,7 +202,7 @@ class Values(Mechanic):
         if not has_assets(state, self.points, self.houses):
             return None
         exposure = state.planes(self.name, Exposure)
-        return torch.where(exposure.worth > 0.0, self._kept(exposure), -1.0)
+        return torch.where(exposure.worth > 0.0, kept(exposure.flames, exposure.spared, self.losses), -1.0)
 
     def caption(self, state: WorldState) -> tuple[str, ...]:
         """Return the worth that is left, the area of the fire, and what became of it."""
@@ -210,16 +210,6 @@ class Values(Mechanic):
         size = f"fire {now['fire_size']:.{0 if now['fire_size'] >= 10.0 else 1}f} ha"
         end = "escaped" if now["escaped"] else "contained" if now["contained"] else ""
         return f"{now['worth_saved']:.0%} of worth left", f"{size}, {end}" if end else size
-
-    def _kept(self, exposure: Exposure) -> Tensor:
-        """Return the share of its worth that flames and embers have left of each asset, float32 [B, H, W]."""
-        return (1.0 - lost(exposure.flames, self.losses)) * exposure.spared
-
-    def _left(self, exposure: Exposure) -> Tensor:
-        """Return the share of the worth that flames and embers have left, float32 [B]; 1 where there was none."""
-        kept = self._kept(exposure)
-        total, left = (each.flatten(1).sum(dim=1) for each in (exposure.worth, exposure.worth * kept))
-        return torch.where(total > 0.0, left / total.clamp(min=1e-30), 1.0)
 
     def _size(self, state: WorldState) -> Tensor:
         """Return the area of the fire over that from which it has escaped, float32 [B]."""
@@ -245,14 +235,19 @@ class Values(Mechanic):
             held=torch.where(ticks_now, _is_held(state, world), before.held),
             size=torch.where(ticks_now, self._size(state), before.size),
         )
-        exposure = exposure.replace(left=self._left(exposure))
-        return state.with_planes(self.name, exposure)
+        left = share_left(exposure.worth, exposure.flames, exposure.spared, self.losses)
+        return state.with_planes(self.name, exposure.replace(left=left))
 
     def _spared(self, state: WorldState, spared: Tensor, here: Tensor) -> Tensor:
         """Return the chance that no ember has ignited an asset, float32 [B, H, W], after a tick."""
         glow = state.plane("embers", "falls")
-        caught = None if glow is None else self.ember_chance * glow.to(torch.float32) / 255.0
-        return spared if caught is None else torch.where(here, spared * (1.0 - caught), spared)
+        if glow is None:
+            return spared
+        glow = glow * byte(here)
+        cell = flat_cells(at_least(glow, 1))
+        caught = self.ember_chance * glow.flatten().index_select(0, cell).to(torch.float32) / 255.0
+        after = spared.flatten().index_select(0, cell) * (1.0 - caught)
+        return spared.flatten().index_copy(0, cell, after).view_as(spared)
 
     def _flames(self, state: WorldState, new: Tensor, fire: Automaton) -> tuple[Tensor, Tensor]:
         """Return the flame length in marked cells that burn or have burned, float32 [B, H, W] [m]; else 0.
@@ -262,7 +257,7 @@ class Values(Mechanic):
         if not isinstance(fire, RateFire):
             return torch.where(new, self.flame_length, 0.0), new
         cell, is_there = first_cells(new, filled(new[0].numel() // _SHARE))
-        found = torch.where(is_there, front_at(fire, state, cell).flame_length.clamp(min=_FLAMES), 0.0)
+        found = torch.where(is_there, front_at(fire, state, cell, is_there).flame_length.clamp(min=_FLAMES), 0.0)
         none = torch.zeros_like(state.alpha)
         flames = none.flatten(1).scatter_reduce(1, cell, found, "amax").view_as(none)
         return flames, above(flames, 0.0)
