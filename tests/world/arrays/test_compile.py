@@ -53,7 +53,7 @@ def test_a_tick_is_the_same():
 
 
 @pytest.mark.slow  # they take as long as fifty others to compile; `.ci/run compile` plays the first
-@pytest.mark.parametrize(("overrides", "few_cells"), zip([BRIEFLY, BRIEFLY, *AT_LENGTH], cycle((FEW_CELLS, 0))))
+@pytest.mark.parametrize(("overrides", "few_cells"), [*zip([BRIEFLY, BRIEFLY, *AT_LENGTH], cycle((FEW_CELLS, 0)))])
 def test_worlds_are_the_same_in_one_function_and_in_two(overrides, few_cells, monkeypatch):
     for each in (scene, operators):
         monkeypatch.setattr(each, "FEW_CELLS", few_cells)

@@ -31,16 +31,17 @@ def of_other_types(batch):
 
 @pytest.mark.parametrize(
     "overrides",
-    filter(
-        can_play,
-        [
+    [
+        overrides
+        for overrides in (
             ["scenario=water"],
             ["scenario=front"],
             ["scenario=smoke", "mechanics.radio.carries=map", "mechanics.radio.delay=2"],
             ["scenario=default", "fire=rate", "wind=wandering", "landscape.relief=50"],
             *of_mechanics("WORLDS").values(),
-        ],
-    ),
+        )
+        if can_play(overrides)
+    ],
     ids=" ".join,
 )
 def test_tensors_are_of_the_types_that_are_told(overrides):

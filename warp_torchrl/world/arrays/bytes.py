@@ -118,7 +118,7 @@ def counts(*codes: Tensor) -> tuple[Tensor, ...]:
 
 
 def index_put(plane: Tensor, place: Tensor, values: Tensor | int) -> Tensor:
-    """Return a plane [B, H, W] that holds values, or one, at flat places int64 [N]; the plane is used up."""
+    """Return a plane [B, H, W] of any type that holds values, or one, at flat places int64 [N]; it is used up."""
     flat = plane.flatten()
     flat = flat.index_copy_(0, place, values) if isinstance(values, Tensor) else flat.index_fill_(0, place, values)
     return flat.view(plane.shape)

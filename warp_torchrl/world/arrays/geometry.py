@@ -53,6 +53,26 @@ def slices(padded: Tensor) -> list[Tensor]:
     return [padded[..., 1 + row : 1 + row + height, 1 + column : 1 + column + width] for row, column in DIRECTIONS]
 
 
+def places_around(cell: Tensor, size: tuple[int, int]) -> Tensor:
+    """Return where the neighbours of cells lie in maps with a margin of one cell, flat indices in all, int64 [8, N].
+
+    Args:
+        cell: Flat indices in maps [B, H, W], int64 [N].
+        size: (H, W).
+    """
+    height, width = size
+    line, column = cell.div(width, rounding_mode="floor"), cell % width
+    return (
+        _steps(width, cell.device) + (line + 2 * line.div(height, rounding_mode="floor") + 1) * (width + 2) + column + 1
+    )
+
+
+@kept(32)
+def _steps(width: int, device: torch.device) -> Tensor:
+    """Return how far each neighbour lies along maps of a width with a margin of one cell, int64 [8, 1]."""
+    return torch.tensor([[down * (width + 2) + right] for down, right in DIRECTIONS], device=device)
+
+
 def grow(mask: Tensor, radius: int = 1) -> Tensor:
     """Return the cells within a Chebyshev distance ``radius`` of a marked cell, bool [..., H, W]."""
     for _ in range(radius):

@@ -122,7 +122,7 @@ def in_wind(fire: Automaton, state: WorldState, wind: Tensor, moisture: Tensor |
     if not len(index):
         return state
     turned = in_air if type(fire) is RateFire else type(fire).in_air
-    if 2 * len(index) > len(differs):  # to copy their rows takes longer
+    if len(index) == len(differs):  # no rows need be copied
         return turned(fire, state, air(fire, wind, moisture, state.ground))
     rows = state[index]
     damp = None if moisture is None else moisture[index]

@@ -10,9 +10,8 @@ import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
-from warp_torchrl.system.modes import kept
 from warp_torchrl.world.arrays.bytes import above, equal, index_put
-from warp_torchrl.world.arrays.geometry import DIRECTIONS
+from warp_torchrl.world.arrays.geometry import places_around
 from warp_torchrl.world.arrays.listing import flat_cells
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.backends.planes import age_fires, is_fuel, spreads
@@ -50,23 +49,25 @@ class AtBand:
         lit = band.cell[ticking & (minutes <= of_world(fire.now(state.replace(tick=state.tick + 1)), band.cell, state))]
         after = self._held(state, _lit(age_fires(fire, state, ticks_now), state.cells, lit))
 
-        kept, trees, comes = arrivals_in(state), is_tree(state.cells) & here, ticking.nonzero()[:, 0]
-        times, origins = torch.where(trees, NEVER, kept.minutes), torch.where(trees, NOWHERE, kept.origin)
-        arrivals = Arrivals(_put(times, band.cell, minutes, comes), _put(origins, band.cell, origin, comes))
-        return after.with_planes(RATE, arrivals)
+        before, trees, now = arrivals_in(state), is_tree(state.cells) & here, ticking.nonzero()[:, 0]
+        times, origins = torch.where(trees, NEVER, before.minutes), torch.where(trees, NOWHERE, before.origin)
+        cell = band.cell.index_select(0, now)
+        times = index_put(times, cell, minutes.index_select(0, now))
+        return after.with_planes(RATE, Arrivals(times, index_put(origins, cell, origin.index_select(0, now))))
 
     def _held(self, before: WorldState, after: WorldState) -> WorldState:
         """Return what ``RateFire._held`` does."""
         ends = equal(before.cells, self.fire.last_spreading) & (after.cells != before.cells)
         fuel = is_fuel(self.fire, after) & above(after.alpha, 0.0)
-        band = band_of(flat_cells(ends), after, ends, fuel)
-        holds = band.cell[padded(fuel, 0).index_select(0, band.around.flatten()).view(8, -1).any(0)]
-        kept = {
+        cell = flat_cells(ends)
+        around = places_around(cell, (after.cells.shape[1], after.cells.shape[2]))
+        holds = cell[padded(fuel, 0).index_select(0, around.flatten()).view(8, -1).any(0)]
+        as_before = {
             name: index_put(getattr(after, name), holds, getattr(before, name).flatten().index_select(0, holds))
             for name in ("cells", "age", "stage_age", "burned")
             if getattr(after, name) is not None
         }
-        return after.replace(**kept)
+        return after.replace(**as_before)
 
     def forecast(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """Return what ``RateFire.expected_ignitions`` and ``RateFire.ignition_probability`` do, float32 [B, H, W]."""
@@ -94,7 +95,8 @@ class AtBand:
 
     def _arrivals(self, state: WorldState, band: "Band") -> Arrivals:
         minutes, origin = self._times(state, band)
-        never, nowhere = torch.full_like(state.alpha, NEVER), torch.full(state.cells.shape, NOWHERE, dtype=torch.int32)
+        never = torch.full_like(state.alpha, NEVER)
+        nowhere = torch.full_like(state.cells, NOWHERE, dtype=torch.int32)
         return Arrivals(index_put(never, band.cell, minutes), index_put(nowhere, band.cell, origin))
 
     def _times(self, state: WorldState, band: "Band") -> tuple[Tensor, Tensor]:
@@ -152,15 +154,8 @@ def band_of(cell: Tensor, state: WorldState, spreads: Tensor, fuel: Tensor) -> B
     place = cell - world * (height * width)
     row = place.div(width, rounding_mode="floor")
     column = place - row * width
-    here = (world * (height + 2) + row + 1) * (width + 2) + column + 1
-    around = _around(width, cell.device) + here
+    around = places_around(cell, (height, width))
     return Band(cell, world * (height * width), row.to(torch.int32), column.to(torch.int32), around, spreads, fuel)
-
-
-@kept(32)
-def _around(width: int, device: torch.device) -> Tensor:
-    """Return how far each neighbour lies along maps of a width with a margin of one cell, int64 [8, 1]."""
-    return torch.tensor([[down * (width + 2) + right] for down, right in DIRECTIONS], device=device)
 
 
 def padded(plane: Tensor, beyond: float) -> Tensor:
@@ -173,13 +168,14 @@ def of_world(values: Tensor, cell: Tensor, state: WorldState) -> Tensor:
     return values.flatten().index_select(0, cell.div(state.cells[0].numel(), rounding_mode="floor"))
 
 
-def _put(plane: Tensor, cell: Tensor, values: Tensor, which: Tensor) -> Tensor:
-    """Return a plane that holds some of the values; the plane is used up."""
-    return index_put(plane, cell.index_select(0, which), values.index_select(0, which))
-
-
 def _lit(after: WorldState, trees: Tensor, cell: Tensor) -> WorldState:
-    """Return worlds in which trees have caught fire; what they were is uint8 [B, H, W], the cells int64 [N]."""
+    """Return worlds in which trees have caught fire.
+
+    Args:
+        after: The worlds, which are used up.
+        trees: Their cells before, uint8 [B, H, W].
+        cell: Flat indices of the trees, int64 [N].
+    """
     return after.replace(
         cells=index_put(after.cells, cell, FIRST_FIRE),
         age=index_put(after.age, cell, trees.flatten().index_select(0, cell)),

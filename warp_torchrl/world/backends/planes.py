@@ -111,7 +111,7 @@ def age_fires(fire: Automaton, state: WorldState, ticks_now: Tensor) -> WorldSta
     stage_ends, waited = byte(is_burning(cells)) * ticking, None
     if state.stage_age is not None:
         waited = to_int32(state.stage_age) + stage_ends
-        stage_ends = byte(equal(waited, fire.ticks_per_stage))
+        stage_ends = stage_ends * byte(equal(waited, fire.ticks_per_stage))
         waited = zero_where(stage_ends, waited)
     after = cells + stage_ends
     to_ash = byte(equal(after, EMBER + 1))

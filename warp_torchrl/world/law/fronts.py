@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
-from warp_torchrl.world.arrays.geometry import DIRECTIONS
+from warp_torchrl.world.arrays.geometry import places_around
 from warp_torchrl.world.arrays.listing import filled, flat_cells, in_all
 from warp_torchrl.world.law.arrivals import arrivals_in, pace_on
 from warp_torchrl.world.law.passing import head_behaviour, passing, steepness_from
@@ -31,7 +31,7 @@ def front_at(fire: RateFire, state: WorldState, cell: Tensor, is_there: Tensor) 
         fire: The automaton.
         state: The worlds.
         cell: Flat indices in each map, int64 [B, n].
-        is_there: Which of them are meant, bool [B, n]; the others' front is 0 or that of the cell.
+        is_there: Which of them are meant, bool [B, n]; the front of others has no meaning.
     """
     place = flat_cells(is_there)
     cells = in_all(cell, state.cells[0].numel()).flatten().index_select(0, place)
@@ -42,11 +42,9 @@ def front_at(fire: RateFire, state: WorldState, cell: Tensor, is_there: Tensor) 
 
 def _front_of(fire: RateFire, state: WorldState, cell: Tensor) -> tuple[Tensor, ...]:
     """Return what ``Front`` holds, float32 [N] each, in some cells, flat indices in [B, H, W], int64 [N]."""
-    minutes, (_, height, width) = arrivals_in(state).minutes, state.cells.shape
-    line, column = cell.div(width, rounding_mode="floor"), cell % width
-    own = (line + 2 * line.div(height, rounding_mode="floor") + 1) * (width + 2) + column + 1
-    padded = pad(minutes, (1, 1, 1, 1), value=NEVER).flatten()
-    around = torch.stack([padded.index_select(0, own + down * (width + 2) + right) for down, right in DIRECTIONS])
+    minutes = arrivals_in(state).minutes
+    place = places_around(cell, (minutes.shape[1], minutes.shape[2]))
+    around = pad(minutes, (1, 1, 1, 1), value=NEVER).flatten().index_select(0, place.flatten()).view(8, -1)
     arrival, pace = (plane.flatten().index_select(0, cell) for plane in (minutes, pace_on(state.ground)))
     heads = head_behaviour(fire.spread_at(state.ground, state.air, cell).each(lambda of: of[0, 0]))
     return arrival, *passing(steepness_from(around, arrival), pace, heads, state.ground.cell_size)

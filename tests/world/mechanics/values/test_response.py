@@ -22,3 +22,5 @@ def test_what_is_left_of_many_cells_is_that_of_whole_maps():
     worth, flames, spared = draw[0].round(), 8.0 * (draw[1] - 0.5).clamp(min=0.0), (draw[2] + 0.3).clamp(max=1.0)
     whole = (worth * kept(flames, spared, HOMES)).flatten(1).sum(1) / worth.flatten(1).sum(1)
     assert torch.equal(share_left(worth, flames, spared, HOMES), whole)
+    turned = worth.transpose(1, 2).contiguous().transpose(1, 2)  # as a layer may lie in memory
+    assert torch.equal(share_left(turned, flames, spared, HOMES), whole)

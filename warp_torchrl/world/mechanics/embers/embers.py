@@ -141,16 +141,20 @@ class Embers(Mechanic):
         falls = torch.where(here, _shown(landing, state), before.falls)
         fallen = before.replace(falls=falls, due=due.view_as(before.due), thrown=thrown)
         state = state.with_planes(self.name, fallen)
-        lights = ticks_now & _are_due(state).flatten(1).any(dim=1)
+        lights = ticks_now & self._are_due(state).flatten(1).any(dim=1)
         return advance_rows(state, lights, lambda rows, ticks: self._light(rows, ticks, fire))
 
     def _light(self, state: WorldState, ticks_now: Tensor, fire: Automaton) -> WorldState:
         """Return worlds in which embers that are due have started fires."""
-        fallen, lit = state.planes(self.name, Fallen), ticks_now[:, None, None] & _are_due(state)
+        fallen, lit = state.planes(self.name, Fallen), ticks_now[:, None, None] & self._are_due(state)
         after = ignited(state, fire, lit)
         new = (after.cells != state.cells).flatten(1).sum(dim=1, dtype=torch.int32)
         fallen = fallen.replace(due=torch.where(lit, _NEVER, fallen.due), spots=fallen.spots + new)
         return after.with_planes(self.name, fallen)
+
+    def _are_due(self, state: WorldState) -> Tensor:
+        """Return on which cells an ember is due to start a fire, bool [B, H, W]."""
+        return state.planes(self.name, Fallen).due <= state.tick[:, None, None]
 
     def _of_heat(self, state: WorldState, cell: Tensor, throws: Tensor, fire: RateFire) -> _Landing:
         """Return where firebrands of cells, int64 [B, K], land under law ``rate``; of them throw some, bool [B, K]."""
@@ -191,11 +195,6 @@ class Embers(Mechanic):
         return _Landing(
             landed, flies.to(torch.float32), ignites, state.tick[:, None].expand_as(landed).to(torch.float32)
         )
-
-
-def _are_due(state: WorldState) -> Tensor:
-    """Return on which cells an ember is due to start a fire, bool [B, H, W]."""
-    return state.planes("embers", Fallen).due <= state.tick[:, None, None]
 
 
 def most_cells(state: WorldState) -> int:

@@ -47,6 +47,10 @@ def kept(flames: Tensor, spared: Tensor, losses: tuple[float, ...]) -> Tensor:
 def share_left(worth: Tensor, flames: Tensor, spared: Tensor, losses: tuple[float, ...]) -> Tensor:
     """Return the share of each world's worth that flames and embers leave, float32 [B]; 1 where there was none.
 
+        sum(worth kept) / sum(worth)
+
+    Few cells have met any, and ``kept`` is dear: it is made of these alone.
+
     Args:
         worth: Of each cell before the fire, float32 [B, H, W].
         flames: See ``kept``, [B, H, W].
@@ -55,8 +59,8 @@ def share_left(worth: Tensor, flames: Tensor, spared: Tensor, losses: tuple[floa
     """
     cell = flat_cells(above(worth, 0.0) & (above(flames, 0.0) | below(spared, 1.0)))
     own, flames, spared = (plane.flatten().index_select(0, cell) for plane in (worth, flames, spared))
-    left = worth.flatten().index_copy(0, cell, own * kept(flames, spared, losses))
-    total, left = (each.view(len(worth), -1).sum(dim=1) for each in (worth, left))
+    after = worth.flatten().index_copy(0, cell, own * kept(flames, spared, losses)).view(worth.shape)
+    total, left = (each.flatten(1).sum(dim=1) for each in (worth, after))
     return torch.where(total > 0.0, left / total.clamp(min=1e-30), 1.0)
 
 
