@@ -4,7 +4,6 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.system.device import needs_no_sync
-from warp_torchrl.world.arrays.compile import is_fused
 
 VECTORS = 64
 """What the length of a list is a multiple of where its numbers must not depend on the batch: some of torch's operations
@@ -33,11 +32,11 @@ def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def flat_cells(mask: Tensor) -> Tensor:
-    """Return the marked cells of all worlds, flat indices in the mask, bool [B, ...], int64 [N].
+    """Return the marked cells of all worlds, flat indices in [B, H, W], int64 [N].
 
-    On a device that would have to synchronise, and in functions that are fused, every cell.
+    On a device that would have to synchronise, every cell.
     """
-    if needs_no_sync(mask.device) and not is_fused():
+    if needs_no_sync(mask.device):
         return places(mask.flatten().view(torch.uint8))
     return torch.arange(mask.numel(), device=mask.device)
 

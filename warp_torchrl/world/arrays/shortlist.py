@@ -6,7 +6,7 @@ from torch.nn.functional import pad
 
 from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.world.arrays.compile import is_fused
-from warp_torchrl.world.arrays.listing import filled, list_cells
+from warp_torchrl.world.arrays.listing import filled, flat_cells, list_cells
 
 
 def first_cells(mask: Tensor, count: int) -> tuple[Tensor, Tensor]:
@@ -31,3 +31,8 @@ def first_cells(mask: Tensor, count: int) -> tuple[Tensor, Tensor]:
     cell = torch.arange(marked.shape[1], device=mask.device).expand_as(slot)
     index = torch.zeros(len(marked), count + 1, dtype=torch.int64, device=mask.device).scatter_(1, slot, cell)
     return index[:, :count], torch.arange(count, device=mask.device) < rank[:, -1:]
+
+
+def marked_cells(mask: Tensor) -> Tensor:
+    """Return what ``flat_cells`` does of a mask, int64 [N]; in functions that are fused, every cell."""
+    return torch.arange(mask.numel(), device=mask.device) if is_fused() else flat_cells(mask)

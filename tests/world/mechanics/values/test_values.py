@@ -135,7 +135,7 @@ def test_under_law_rate_a_house_meets_the_front_as_it_came():
     values = Values(points=((1, 5, 1.0),))
     state, found = played(values, 12, drawing, ground, RATE)
     cell = torch.tensor([[1 * 8 + 5]])
-    flames = front_at(RATE, state, cell, torch.ones_like(cell, dtype=torch.bool)).flame_length
+    flames = front_at(RATE, state, cell.expand(1, 64).flatten()).flame_length[:1]
     assert flames.item() > 0.5 and state.planes("values", Exposure).flames[0, 1, 5] == pytest.approx(flames.item())
     assert found["worth_saved"] == pytest.approx(1.0 - lost(flames, HOMES).item())
     assert found["contained_at"] <= 24.0 and not state.planes("values", Exposure).flames[0, 0].any()

@@ -12,10 +12,10 @@ from warp_torchrl.world.arrays.listing import filled
 from warp_torchrl.world.arrays.random import Stream, named_key, uniform
 from warp_torchrl.world.arrays.shortlist import first_cells
 from warp_torchrl.world.backends.backend import advance_rows
+from warp_torchrl.world.backends.fronts import fronts
 from warp_torchrl.world.behaviour.firebreaks import holds_up_to, intensity_of
 from warp_torchrl.world.ignition.intervention import ignited
 from warp_torchrl.world.law.automaton import Automaton
-from warp_torchrl.world.law.fronts import front_at
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.mechanics.mechanic import Mechanic, Metric, Rules
 from warp_torchrl.world.mechanics.table import mechanic
@@ -111,5 +111,5 @@ class Breach(Mechanic):
         if not isinstance(fire, RateFire):
             return torch.where(burns, intensity_of(self.flame_length), none)
         cell, is_there = first_cells(burns, filled(state.cells[0].numel() // _SHARE))
-        found = torch.where(is_there, front_at(fire, state, cell, is_there).intensity, -torch.inf)
+        found = torch.where(is_there, fronts(fire, state, cell, is_there).intensity, -torch.inf)
         return none.flatten(1).scatter_reduce(1, cell, found, "amax").view_as(none)

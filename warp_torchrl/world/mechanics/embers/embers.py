@@ -17,10 +17,10 @@ from warp_torchrl.world.arrays.listing import filled
 from warp_torchrl.world.arrays.random import Stream, named_key, uniform, uniform_at
 from warp_torchrl.world.arrays.shortlist import first_cells
 from warp_torchrl.world.backends.backend import advance_rows
+from warp_torchrl.world.backends.fronts import fronts
 from warp_torchrl.world.behaviour.firebrands import FLIGHT, LANDING, Firebrands, Plume, lognormal, normal_of
 from warp_torchrl.world.ignition.intervention import ignited
 from warp_torchrl.world.law.automaton import Automaton, at_cells
-from warp_torchrl.world.law.fronts import front_at
 from warp_torchrl.world.law.law import in_finer_time
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.mechanics.mechanic import Mechanic, Metric, Rules
@@ -158,7 +158,7 @@ class Embers(Mechanic):
 
     def _of_heat(self, state: WorldState, cell: Tensor, throws: Tensor, fire: RateFire) -> _Landing:
         """Return where firebrands of cells, int64 [B, K], land under law ``rate``; of them throw some, bool [B, K]."""
-        brands, front, size = self.firebrands, front_at(fire, state, cell, throws), state.ground.cell_size
+        brands, front, size = self.firebrands, fronts(fire, state, cell, throws), state.ground.cell_size
         number = brands.number(front.intensity, front.rate, size**2) * throws
         east, north = _wind_at(state, cell)
         plume = Plume(front.intensity, front.flame_length, number, east, north)

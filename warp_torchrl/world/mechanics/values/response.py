@@ -5,7 +5,7 @@ from torch import Tensor
 
 from warp_torchrl.world.arrays.bytes import above, below
 from warp_torchrl.world.arrays.constants import numbers
-from warp_torchrl.world.arrays.listing import flat_cells
+from warp_torchrl.world.arrays.shortlist import marked_cells
 
 LEVELS = (0.6096, 1.2192, 1.8288, 2.4384, 3.6576)
 """Flame lengths that part the six fire intensity levels, 2, 4, 6, 8 and 12 ft [m] (Scott, Thompson and Calkin 2013)."""
@@ -57,7 +57,7 @@ def share_left(worth: Tensor, flames: Tensor, spared: Tensor, losses: tuple[floa
         spared: See ``kept``, [B, H, W].
         losses: See ``lost``.
     """
-    cell = flat_cells(above(worth, 0.0) & (above(flames, 0.0) | below(spared, 1.0)))
+    cell = marked_cells(above(worth, 0.0) & (above(flames, 0.0) | below(spared, 1.0)))
     own, flames, spared = (plane.flatten().index_select(0, cell) for plane in (worth, flames, spared))
     after = worth.flatten().index_copy(0, cell, own * kept(flames, spared, losses)).view(worth.shape)
     total, left = (each.flatten(1).sum(dim=1) for each in (worth, after))

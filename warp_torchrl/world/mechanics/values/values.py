@@ -12,11 +12,11 @@ from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.bytes import above, at_least, between, byte
 from warp_torchrl.world.arrays.constants import numbers
 from warp_torchrl.world.arrays.geometry import grow
-from warp_torchrl.world.arrays.listing import filled, flat_cells
-from warp_torchrl.world.arrays.shortlist import first_cells
+from warp_torchrl.world.arrays.listing import filled
+from warp_torchrl.world.arrays.shortlist import first_cells, marked_cells
 from warp_torchrl.world.backends.backend import advance_rows
+from warp_torchrl.world.backends.fronts import fronts
 from warp_torchrl.world.law.automaton import Automaton
-from warp_torchrl.world.law.fronts import front_at
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.mechanics.mechanic import Mechanic, Metric, Rules
 from warp_torchrl.world.mechanics.minutes import check_minutes, minutes_of_tick
@@ -244,7 +244,7 @@ class Values(Mechanic):
         if glow is None:
             return spared
         glow = glow * byte(here)
-        cell = flat_cells(at_least(glow, 1))
+        cell = marked_cells(at_least(glow, 1))
         caught = self.ember_chance * glow.flatten().index_select(0, cell).to(torch.float32) / 255.0
         after = spared.flatten().index_select(0, cell) * (1.0 - caught)
         return spared.flatten().index_copy(0, cell, after).view_as(spared)
@@ -257,7 +257,7 @@ class Values(Mechanic):
         if not isinstance(fire, RateFire):
             return torch.where(new, self.flame_length, 0.0), new
         cell, is_there = first_cells(new, filled(new[0].numel() // _SHARE))
-        found = torch.where(is_there, front_at(fire, state, cell, is_there).flame_length.clamp(min=_FLAMES), 0.0)
+        found = torch.where(is_there, fronts(fire, state, cell, is_there).flame_length.clamp(min=_FLAMES), 0.0)
         none = torch.zeros_like(state.alpha)
         flames = none.flatten(1).scatter_reduce(1, cell, found, "amax").view_as(none)
         return flames, above(flames, 0.0)
