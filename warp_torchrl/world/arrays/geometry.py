@@ -62,9 +62,8 @@ def places_around(cell: Tensor, size: tuple[int, int]) -> Tensor:
     """
     height, width = size
     line, column = cell.div(width, rounding_mode="floor"), cell % width
-    return (
-        _steps(width, cell.device) + (line + 2 * line.div(height, rounding_mode="floor") + 1) * (width + 2) + column + 1
-    )
+    margins = 2 * line.div(height, rounding_mode="floor") + 1  # lines of margins before it
+    return _steps(width, cell.device) + (line + margins) * (width + 2) + column + 1
 
 
 @kept(32)

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields, did_you_mean
 from warp_torchrl.world.arrays.batch import Batch
-from warp_torchrl.world.arrays.bytes import above, at_least, between, byte
+from warp_torchrl.world.arrays.bytes import above, between
 from warp_torchrl.world.arrays.constants import numbers
 from warp_torchrl.world.arrays.geometry import grow
 from warp_torchrl.world.arrays.listing import filled
@@ -243,8 +243,8 @@ class Values(Mechanic):
         glow = state.plane("embers", "falls")
         if glow is None:
             return spared
-        glow = glow * byte(here)
-        cell = marked_cells(at_least(glow, 1))
+        glow = torch.where(here, glow, 0)
+        cell = marked_cells(glow > 0)
         caught = self.ember_chance * glow.flatten().index_select(0, cell).to(torch.float32) / 255.0
         after = spared.flatten().index_select(0, cell) * (1.0 - caught)
         return spared.flatten().index_copy(0, cell, after).view_as(spared)
