@@ -498,6 +498,37 @@ def test_a_run_starts_from_an_exported_policy_with_a_critic_of_its_own(finished,
     assert training.frames >= training.run_config.total_frames, "and it learns"
 
 
+def test_a_run_starts_from_a_policy_that_sees_less_and_does_as_it_did(finished, tmp_path, caplog):
+    found, _ = newest(finished[0])
+    training = tiny(tmp_path, "observation.rules=true", "landscape.size=16", "n_worlds=3")
+    critic = {name: each.clone() for name, each in training.learner.loss.state_dict().items() if "critic" in name}
+    with caplog.at_level("INFO", logger="warp_torchrl"):
+        training.start_from(found)
+    fresh, new = caplog.messages
+    assert "observation status is not as it was there: the critic starts fresh" in fresh
+    assert "learns to see rule_burning, rule_horizon" in new and new.endswith("which weigh nothing at first")
+    now = training.learner.loss.state_dict()
+    assert all(torch.equal(now[name], each) for name, each in critic.items())
+    seen = training.env.reset()
+    less = seen.clone()
+    known = [training.env.channel_names["status"].index(name) for name in finished[1].env.channel_names["status"]]
+    less["agents", "observation", "status"] = seen["agents", "observation", "status"][..., known]
+    logits = [
+        each.learner.policy[0](given)["agents", "logits"] for each, given in ((training, seen), (finished[1], less))
+    ]
+    assert torch.allclose(*logits, atol=1e-6)
+
+
+def test_actions_and_roles_of_networks_are_those_of_the_start(finished, tmp_path):
+    with pytest.raises(CheckpointError, match=r"actions is north, .* there, .* here$"):
+        tiny(tmp_path / "a", "team.allow_stay=false").start_from(newest(finished[0])[0])
+    roles = ["model.sharing=role", *TINIER]
+    (tmp_path / "b").mkdir()
+    tiny(tmp_path / "b", *roles, "team.roles=[ugv]").train()
+    with pytest.raises(CheckpointError, match=r"roles is ugv, uav there, .* here$"):
+        tiny(tmp_path / "c", *roles, "sensing=sight", "team.roles=[scout,ugv]").start_from(newest(tmp_path / "b")[0])
+
+
 @pytest.mark.parametrize("change", ["model.actor_hidden=[8]", "algorithm=ippo", "algorithm=dqn"])
 def test_networks_of_another_kind_are_no_start(finished, tmp_path, change):
     training = tiny(tmp_path, change)

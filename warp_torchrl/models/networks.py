@@ -56,6 +56,10 @@ class LinearEncoder(nn.Module):
         nn.init.zeros_(parts[0].bias)
         self.parts = nn.ModuleList(parts)
 
+    def first_weights(self) -> dict[str, Entry]:
+        """Return what each weight reads, by its name: [size, numbers of the entry]."""
+        return {f"parts.{index}.weight": entry for index, entry in enumerate(self.entries)}
+
     def forward(self, *inputs: Tensor) -> Tensor:
         """Return features, float [..., size]."""
         return reduce(operator.add, (part(given) for part, given in zip(self.parts, inputs, strict=True)))
@@ -92,6 +96,10 @@ class ConvolutionalEncoder(nn.Module):
             )
             flat.append(Entry((channels[-1] * entry.shape[1] * entry.shape[2],), "float32"))
         self.joined = LinearEncoder(flat, size)
+
+    def first_weights(self) -> dict[str, Entry]:
+        """Return what the first convolution over each image reads, by its name: [out, channels, K, K]."""
+        return {f"images.{index}.0.weight": self.entries[int(index)] for index in self.images}
 
     def forward(self, *inputs: Tensor) -> Tensor:
         """Return features, float [..., size]."""

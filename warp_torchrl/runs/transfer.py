@@ -1,14 +1,26 @@
 """Start of a run from another run's learned parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
-from torch import Tensor
+import torch
+from torch import Tensor, nn
 from torchrl.objectives import LossModule
 
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.algorithms.on_policy import OnPolicy
+from warp_torchrl.models import Signature, differing, signature
+from warp_torchrl.models.matching import differences, matched
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError
 from warp_torchrl.runs.config.run_config import RunConfig
+
+
+class Start(NamedTuple):
+    """What a training starts with."""
+
+    part: nn.Module  # of the learner: its loss, or its policy alone
+    parameters: dict[str, Tensor]  # of the whole part, by name
+    notes: tuple[str, ...]  # what the log tells
 
 
 def check_start(run_config: RunConfig, found: Checkpoint) -> None:
@@ -18,30 +30,58 @@ def check_start(run_config: RunConfig, found: Checkpoint) -> None:
         CheckpointError: If the checkpoint has another kind of loss or other networks, or is an exported policy and
             the algorithm replays.
     """
-    if not isinstance(run_config.algorithm, OnPolicy):
-        found.check_goes_on()
-    symmetry = getattr(run_config.model, "symmetry", "none")  # networks of either have the same names and shapes
-    theirs = found.saved_config().values.get("model", {}).get("symmetry", "none")
-    if theirs != symmetry:
-        raise _other_networks(found, "model.symmetry", theirs, symmetry)
-    batch = run_config.collector.steps * run_config.n_worlds
-    learner = run_config.algorithm.build(run_config.make_env(1, 0), run_config.model, batch)
-    if found.goes_on:
-        learned_parameters(found, learner.loss)
-    else:
-        actor_parameters(found, learner)
+    batch, env = run_config.collector.steps * run_config.n_worlds, run_config.make_env(1, 0)
+    start_of(found, run_config, run_config.algorithm.build(env, run_config.model, batch), signature(env))
 
 
-def actor_parameters(found: Checkpoint, learner: Learner) -> dict[str, Tensor]:
-    """Return the parameters of an exported policy, by the names of a learner's policy.
+def start_of(found: Checkpoint, run_config: RunConfig, learner: Learner, here: Signature) -> Start:
+    """Return what a learner starts with from another run.
+
+    All that was learned, where agents and critic see what they saw there; else, and from an exported policy, the policy
+    alone, with what agents see matched by name, see ``matched``.
+
+    Args:
+        found: The other run's checkpoint.
+        run_config: Of the training that starts.
+        learner: Its learner.
+        here: Signature of its environment.
 
     Raises:
-        CheckpointError: If their names or shapes differ.
+        CheckpointError: As of ``check_start``.
     """
-    now = learner.policy.state_dict()
-    given = found.policy()
-    _check_alike(found, now, given)
-    return given
+    replays, trained = not isinstance(run_config.algorithm, OnPolicy), found.manifest.signature
+    if replays:
+        found.check_goes_on()
+    model = run_config.model
+    symmetry = getattr(model, "symmetry", "none")  # networks of either have the same names and shapes
+    theirs = found.saved_config().values.get("model", {}).get("symmetry", "none")
+    _check_same(found, "model.symmetry", theirs, symmetry)
+    _check_same(found, "actions", ", ".join(trained.actions), ", ".join(here.actions))
+    if getattr(model, "sharing", "team") == "role":
+        _check_same(found, "roles", ", ".join(trained.roles), ", ".join(here.roles))
+    other = differing(trained, here)
+    sees_alike = other is None or other in ("actions", "roles", "agencies")
+    if found.goes_on and (replays or sees_alike):
+        loss = learner.loss
+        return Start(loss, {**loss.state_dict(), **learned_parameters(found, loss)}, ())
+    notes = [f"start_from: {other} is not as it was there: the critic starts fresh"] if found.goes_on else []
+    policy, given = learner.policy, found.policy()
+    if _shapes(policy.state_dict()).keys() == given.keys() and list(trained.observation) == list(here.observation):
+        with torch.device("meta"):
+            before = run_config.algorithm.policy(trained, model)
+        if _shapes(before.state_dict()) == _shapes(given):
+            given = matched(given, before, policy)
+            notes += _told(*differences(before, policy))
+    _check_alike(found, policy.state_dict(), given)
+    return Start(policy, given, tuple(notes))
+
+
+def _told(new: list[str], left: list[str]) -> Iterator[str]:
+    """Yield lines that tell what agents see that the policy did not, and the other way round."""
+    if new:
+        yield f"start_from: the policy learns to see {', '.join(new)}, which weigh nothing at first"
+    if left:
+        yield f"start_from: the policy no longer sees {', '.join(left)}"
 
 
 def learned_parameters(found: Checkpoint, loss: LossModule) -> dict[str, Tensor]:
@@ -65,14 +105,23 @@ def _is_learned(name: str) -> bool:
 
 def _check_alike(found: Checkpoint, own: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> None:
     """Check that networks have the names and shapes of a checkpoint's."""
-    theirs, ours = ({name: list(each.shape) for name, each in state.items()} for state in (given, own))
+    theirs, ours = _shapes(given), _shapes(own)
     for name in {**ours, **theirs}:
-        if theirs.get(name) != ours.get(name):
-            raise _other_networks(found, name, theirs.get(name, "missing"), ours.get(name, "missing"))
+        _check_same(found, name, theirs.get(name, "missing"), ours.get(name, "missing"))
 
 
-def _other_networks(found: Checkpoint, what: str, there: object, here: object) -> CheckpointError:
-    return CheckpointError(
-        f"{found.path} was trained by another algorithm or other networks, or its agents see more or less: "
-        f"{what} is {there} there, {here} here"
-    )
+def _shapes(parameters: Mapping[str, Tensor]) -> dict[str, list[int]]:
+    return {name: list(each.shape) for name, each in parameters.items()}
+
+
+def _check_same(found: Checkpoint, what: str, there: object, here: object) -> None:
+    """Check that something is here as it was there.
+
+    Raises:
+        CheckpointError: If it is not.
+    """
+    if there != here:
+        raise CheckpointError(
+            f"{found.path} was trained by another algorithm or other networks, or its agents see more or less: "
+            f"{what} is {there} there, {here} here"
+        )

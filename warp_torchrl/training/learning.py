@@ -3,6 +3,7 @@
 What differs between algorithms is a field of ``Learner``. Every process of a run learns from its share of the worlds.
 """
 
+import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import zip_longest
@@ -19,9 +20,10 @@ from warp_torchrl.collection.guidance import guided
 from warp_torchrl.collection.running import Collection
 from warp_torchrl.demonstrations.acts import demonstrations
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.models import signature
 from warp_torchrl.runs.checkpoint import Checkpoint
 from warp_torchrl.runs.config.run_config import RunConfig
-from warp_torchrl.runs.transfer import actor_parameters, learned_parameters
+from warp_torchrl.runs.transfer import start_of
 from warp_torchrl.system.compiler import compile_function
 from warp_torchrl.training.finite import FiniteSteps, NumericalFailure
 from warp_torchrl.training.kickstarting import kickstart
@@ -30,6 +32,8 @@ from warp_torchrl.training.progress import TRAIN_COLUMNS, batch_columns
 from warp_torchrl.training.recorded import RecordedUpdate
 from warp_torchrl.training.tasks import Task, TaskWorlds, learners, task_worlds
 from warp_torchrl.training.weighing import weighing
+
+log = logging.getLogger("warp_torchrl")
 
 
 class Learning:
@@ -194,16 +198,16 @@ class Learning:
     def start_from(self, found: Checkpoint) -> None:
         """Load another run's networks and value normalisation; everything else starts fresh.
 
-        An exported policy has the actor's networks only; then the critic's start fresh too.
+        An exported policy has the actor's networks only; then the critic's start fresh too, as they do where agents or
+        critic see something else.
 
         Raises:
             CheckpointError: If that run had another kind of loss or other networks.
         """
-        if not found.goes_on:
-            self.learner.policy.load_state_dict(actor_parameters(found, self.learner))
-            return
-        loss = self.learner.loss
-        loss.load_state_dict({**loss.state_dict(), **learned_parameters(found, loss)})
+        start = start_of(found, self.run_config, self.learner, signature(self.env))
+        start.part.load_state_dict(start.parameters)
+        for note in start.notes:
+            log.info(note)
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that an exact resume needs of this process."""
