@@ -6,6 +6,7 @@ import re
 import shutil
 import signal
 from copy import deepcopy
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
@@ -505,7 +506,7 @@ def test_a_run_starts_from_a_policy_that_sees_less_and_does_as_it_did(finished, 
     with caplog.at_level("INFO", logger="warp_torchrl"):
         training.start_from(found)
     fresh, new = caplog.messages
-    assert "observation status is not as it was there: the critic starts fresh" in fresh
+    assert fresh == "start_from: the critic starts fresh, for status is not as it was there"
     assert "learns to see rule_burning, rule_horizon" in new and new.endswith("which weigh nothing at first")
     now = training.learner.loss.state_dict()
     assert all(torch.equal(now[name], each) for name, each in critic.items())
@@ -519,6 +520,29 @@ def test_a_run_starts_from_a_policy_that_sees_less_and_does_as_it_did(finished, 
     assert torch.allclose(*logits, atol=1e-6)
 
 
+def test_an_adviser_and_trust_in_it_may_be_new(finished, tmp_path):
+    given = ["observation.rules=true", "observation.advice=dispatch", "model.trust=0.5"]
+    training = tiny(tmp_path, *given)
+    training.start_from(newest(finished[0])[0])
+    names = training.env.channel_names["status"]
+    (weight,) = [each for name, each in training.learner.policy.state_dict().items() if name.endswith("parts.0.weight")]
+    new = [place for place, name in enumerate(names) if name.startswith(("advice_", "rule_"))]
+    assert weight.shape[1] == len(names) and not weight[:, new].any() and weight.any()
+
+
+def test_a_critic_stays_where_messages_come_late_from_now_on(tmp_path, caplog):
+    (tmp_path / "a").mkdir()
+    tiny(tmp_path / "a", "model.messages=graph", *TINIER).train()
+    found, training = newest(tmp_path / "a")[0], tiny(tmp_path / "b", "model.messages=graph", "mechanics.radio.delay=2")
+    caplog.clear()
+    with caplog.at_level("INFO", logger="warp_torchrl"):
+        training.start_from(found)
+    now, theirs = training.learner.loss.state_dict(), found.training()["loss"]
+    assert not caplog.messages
+    critic = [name for name in now if "critic_network_params" in name]
+    assert critic and all(torch.equal(now[name], theirs[name]) for name in critic)
+
+
 def test_actions_and_roles_of_networks_are_those_of_the_start(finished, tmp_path):
     with pytest.raises(CheckpointError, match=r"actions is north, .* there, .* here$"):
         tiny(tmp_path / "a", "team.allow_stay=false").start_from(newest(finished[0])[0])
@@ -527,6 +551,18 @@ def test_actions_and_roles_of_networks_are_those_of_the_start(finished, tmp_path
     tiny(tmp_path / "b", *roles, "team.roles=[ugv]").train()
     with pytest.raises(CheckpointError, match=r"roles is ugv, uav there, .* here$"):
         tiny(tmp_path / "c", *roles, "sensing=sight", "team.roles=[scout,ugv]").start_from(newest(tmp_path / "b")[0])
+
+
+def test_replays_start_from_what_was_seen_alone(tmp_path):
+    first = tiny(tmp_path, "algorithm=dqn", *REPLAY, *TINIER)
+    first.train()
+    found = newest(tmp_path)[0]
+    status = found.manifest.signature.observation["status"]
+    turned = found.manifest.signature.observation | {"status": status._replace(names=status.names[::-1])}
+    other = replace(found.manifest, signature=found.manifest.signature._replace(observation=turned))
+    with pytest.raises(CheckpointError, match="the names of status is"):
+        first.start_from(replace(found, manifest=other))
+    first.start_from(found)
 
 
 @pytest.mark.parametrize("change", ["model.actor_hidden=[8]", "algorithm=ippo", "algorithm=dqn"])

@@ -40,8 +40,10 @@ def matched(parameters: Mapping[str, Tensor], trained: nn.Module, here: nn.Modul
 
 def differences(trained: nn.Module, here: nn.Module) -> tuple[list[str], list[str]]:
     """Return the names that are new to trained networks, and those that they no longer see, each in order."""
-    theirs, ours = ({name for each in first_weights(one).values() for name in each.names} for one in (trained, here))
-    return sorted(ours - theirs), sorted(theirs - ours)
+    theirs, ours = first_weights(trained), first_weights(here)
+    pairs = [(set(theirs[weight].names), set(entry.names)) for weight, entry in ours.items() if weight in theirs]
+    new, left = ({name for one, two in pairs for name in two - one}, {name for one, two in pairs for name in one - two})
+    return sorted(new), sorted(left)
 
 
 def _is_renamed(trained: Entry, here: Entry) -> bool:
@@ -51,7 +53,7 @@ def _is_renamed(trained: Entry, here: Entry) -> bool:
 
 
 def _matched(weight: Tensor, trained: Entry, here: Entry) -> Tensor:
-    """Return the weights [out, n, ...] or [out, n ...] over an entry, by those over a trained one."""
+    """Return the weights [out, channels, K, K], or flat [out, numbers], over an entry by those over a trained one."""
     is_flat = weight.dim() == 2
     by_name = weight.unflatten(1, (len(trained.names), -1)) if is_flat else weight
     known = [name for name in here.names if name in trained.names]

@@ -1,6 +1,7 @@
 """Start of a run from another run's learned parameters."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import torch
@@ -9,7 +10,7 @@ from torchrl.objectives import LossModule
 
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.algorithms.on_policy import OnPolicy
-from warp_torchrl.models import Signature, differing, signature
+from warp_torchrl.models import Entry, Signature, signature
 from warp_torchrl.models.matching import differences, matched
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError
 from warp_torchrl.runs.config.run_config import RunConfig
@@ -27,8 +28,9 @@ def check_start(run_config: RunConfig, found: Checkpoint) -> None:
     """Check that training can start from another run's learned parameters.
 
     Raises:
-        CheckpointError: If the checkpoint has another kind of loss or other networks, or is an exported policy and
-            the algorithm replays.
+        CheckpointError: If the checkpoint has another kind of loss, or other networks, entries, actions, symmetry, or
+            roles or agencies of networks; where the algorithm replays, also if agents see something else, or it is an
+            exported policy.
     """
     batch, env = run_config.collector.steps * run_config.n_worlds, run_config.make_env(1, 0)
     start_of(found, run_config, run_config.algorithm.build(env, run_config.model, batch), signature(env))
@@ -49,31 +51,60 @@ def start_of(found: Checkpoint, run_config: RunConfig, learner: Learner, here: S
     Raises:
         CheckpointError: As of ``check_start``.
     """
-    replays, trained = not isinstance(run_config.algorithm, OnPolicy), found.manifest.signature
+    algorithm, model, trained = run_config.algorithm, run_config.model, found.manifest.signature
+    replays = not isinstance(algorithm, OnPolicy)
     if replays:
         found.check_goes_on()
-    model = run_config.model
     symmetry = getattr(model, "symmetry", "none")  # networks of either have the same names and shapes
     theirs = found.saved_config().values.get("model", {}).get("symmetry", "none")
     _check_same(found, "model.symmetry", theirs, symmetry)
-    _check_same(found, "actions", ", ".join(trained.actions), ", ".join(here.actions))
-    if getattr(model, "sharing", "team") == "role":
-        _check_same(found, "roles", ", ".join(trained.roles), ", ".join(here.roles))
-    other = differing(trained, here)
-    sees_alike = other is None or other in ("actions", "roles", "agencies")
-    if found.goes_on and (replays or sees_alike):
+    _check_same(found, "actions", _joined(trained.actions), _joined(here.actions))
+    _check_same(found, "observation", _joined(trained.observation), _joined(here.observation))
+    by = getattr(model, "sharing", "team")
+    if by in ("role", "agency"):
+        names = (one.roles if by == "role" else one.agencies for one in (trained, here))
+        _check_same(found, "roles" if by == "role" else "agencies", *(_joined(each) for each in names))
+    seen = [_seen(one, getattr(algorithm, "central_critic", True)) for one in (trained, here)]
+    if replays:
+        for name, entry in seen[0].items():
+            _check_same(found, f"the names of {name}", _joined(entry.names), _joined(seen[1][name].names))
+    if found.goes_on and (replays or seen[0] == seen[1]):
         loss = learner.loss
         return Start(loss, {**loss.state_dict(), **learned_parameters(found, loss)}, ())
-    notes = [f"start_from: {other} is not as it was there: the critic starts fresh"] if found.goes_on else []
+    other = ", ".join(name or "observation" for name in seen[1] if seen[0].get(name) != seen[1][name])
+    notes = [f"start_from: the critic starts fresh, for {other} is not as it was there"] if found.goes_on else []
     policy, given = learner.policy, found.policy()
-    if _shapes(policy.state_dict()).keys() == given.keys() and list(trained.observation) == list(here.observation):
-        with torch.device("meta"):
-            before = run_config.algorithm.policy(trained, model)
-        if _shapes(before.state_dict()) == _shapes(given):
-            given = matched(given, before, policy)
-            notes += _told(*differences(before, policy))
+    before = _networks_of(run_config, trained)
+    if before is not None and _shapes(before.state_dict()) == _shapes(given):
+        given = matched(given, before, policy)
+        notes += _told(*differences(before, policy))
     _check_alike(found, policy.state_dict(), given)
     return Start(policy, given, tuple(notes))
+
+
+def _networks_of(run_config: RunConfig, trained: Signature) -> nn.Module | None:
+    """Return the policy that a run would have of what was seen there, without memory; None where it can have none.
+
+    Trust has no parameters, and needs an adviser that may be new.
+    """
+    model = run_config.model
+    for each in (model, *([replace(model, trust=0.0)] if getattr(model, "trust", 0.0) else [])):
+        try:
+            with torch.device("meta"):
+                return run_config.algorithm.policy(trained, each)
+        except ValueError:  # of what the model needs, and was not seen there
+            continue
+    return None
+
+
+def _seen(signature: Signature, state: bool) -> dict[str, Entry]:
+    """Return what networks read, by name: the observation, and the critic's state where it reads that."""
+    bare = signature.bare()
+    return {**bare.observation, **({"state": bare.state} if state else {})}
+
+
+def _joined(names: Iterable[str]) -> str:
+    return ", ".join(names)
 
 
 def _told(new: list[str], left: list[str]) -> Iterator[str]:
