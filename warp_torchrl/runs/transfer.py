@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -51,19 +51,11 @@ def start_of(found: Checkpoint, run_config: RunConfig, learner: Learner, here: S
     Raises:
         CheckpointError: As of ``check_start``.
     """
-    algorithm, model, trained = run_config.algorithm, run_config.model, found.manifest.signature
+    algorithm, trained = run_config.algorithm, found.manifest.signature
     replays = not isinstance(algorithm, OnPolicy)
     if replays:
         found.check_goes_on()
-    symmetry = getattr(model, "symmetry", "none")  # networks of either have the same names and shapes
-    theirs = found.saved_config().values.get("model", {}).get("symmetry", "none")
-    _check_same(found, "model.symmetry", theirs, symmetry)
-    _check_same(found, "actions", _joined(trained.actions), _joined(here.actions))
-    _check_same(found, "observation", _joined(trained.observation), _joined(here.observation))
-    by = getattr(model, "sharing", "team")
-    if by in ("role", "agency"):
-        names = (one.roles if by == "role" else one.agencies for one in (trained, here))
-        _check_same(found, "roles" if by == "role" else "agencies", *(_joined(each) for each in names))
+    _check_kind(found, run_config.model, here)
     seen = [_seen(one, getattr(algorithm, "central_critic", True)) for one in (trained, here)]
     if replays:
         for name, entry in seen[0].items():
@@ -80,6 +72,20 @@ def start_of(found: Checkpoint, run_config: RunConfig, learner: Learner, here: S
         notes += _told(*differences(before, policy))
     _check_alike(found, policy.state_dict(), given)
     return Start(policy, given, tuple(notes))
+
+
+def _check_kind(found: Checkpoint, model: Any, here: Signature) -> None:
+    """Check that symmetry, actions, entries, and the roles or agencies of networks are those of a checkpoint."""
+    trained, sharing = found.manifest.signature, getattr(model, "sharing", "team")
+    symmetry = getattr(model, "symmetry", "none")  # networks of either have the same names and shapes
+    theirs = found.saved_config().values.get("model", {}).get("symmetry", "none")
+    _check_same(found, "model.symmetry", theirs, symmetry)
+    _check_same(found, "actions", _joined(trained.actions), _joined(here.actions))
+    _check_same(found, "observation", _joined(trained.observation), _joined(here.observation))
+    if sharing == "role":
+        _check_same(found, "roles", _joined(trained.roles), _joined(here.roles))
+    if sharing == "agency":
+        _check_same(found, "agencies", _joined(trained.agencies), _joined(here.agencies))
 
 
 def _networks_of(run_config: RunConfig, trained: Signature) -> nn.Module | None:
