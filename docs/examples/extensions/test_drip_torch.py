@@ -49,7 +49,7 @@ def test_a_policy_that_was_trained_before_plays_beside_burners() -> None:
 
 @pytest.mark.parametrize("sharing", ["team", "role"])
 def test_a_policy_that_knows_the_torch_is_refused_where_there_is_none(sharing: str) -> None:
-    env = make_env("default", n_worlds=2, plugins=["drip_torch"], overrides=["team=burners"])
+    env = make_env("default", n_worlds=16, plugins=["drip_torch"], overrides=["team=burners"])
     learnt = signature(env)
     assert learnt.actions[-1] == "ignite" and learnt.roles == ("ugv", "uav", "burner")
     assert {"role_burner", "last_ignite"} <= set(learnt.observation["status"].names)
