@@ -110,7 +110,8 @@ def test_the_forms_of_moisture_tell_the_same(form):
     )
     for name in FIELDS:
         assert getattr(told, name).shape == (3, 5, 7)
-        torch.testing.assert_close(getattr(told, name), getattr(expected, name), rtol=1e-5, atol=1e-6)
+        atol = 1e-3 if name == "direction" else 1e-6  # degrees of a whole turn
+        torch.testing.assert_close(getattr(told, name), getattr(expected, name), rtol=1e-5, atol=atol)
 
 
 def test_each_world_has_its_own_moisture_on_one_map():
