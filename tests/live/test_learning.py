@@ -8,7 +8,7 @@ import pytest
 
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.keeping import Keeper
-from warp_torchrl.live.learning import PageTraining, _literal, arguments
+from warp_torchrl.live.learning import PageTraining, arguments
 from warp_torchrl.live.match import Match
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.config.building import run_config
@@ -87,18 +87,6 @@ def test_what_is_of_another_machine_is_not_asked_for():
     assert "NoCurriculum" in made["curriculum"]["_target_"], "a trained policy goes on in the scenario that is played"
     assert made["mixture"] == plain(compose_config("train", []))["mixture"], "and in no other"
     assert made["imitation"]["teacher"] is None, "people teach now"
-
-
-@pytest.mark.parametrize(
-    ("value", "literal"),
-    [
-        (None, "null"), (True, "true"), (0.5, "0.5"), (1e-05, "1e-05"), ("text", "text"), ("null", "'null'"),
-        ("3", "'3'"), ([64, 64], "[64,64]"), (["a b", None], "['a b',null]"), ("a'b\\", "'a\\'b\\\\'"),
-    ],
-)  # fmt: skip
-def test_values_are_written_as_hydra_reads_them(value, literal):
-    assert _literal(value) == literal
-    assert plain(compose_config("train", [f"+own={literal}"]))["own"] == value
 
 
 # The process

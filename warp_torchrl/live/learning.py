@@ -1,7 +1,6 @@
 """Training that a page starts from its recordings, in a separate process."""
 
 import csv
-import re
 import time
 from collections.abc import Sequence
 from datetime import datetime
@@ -13,12 +12,11 @@ from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.match import Setting
 from warp_torchrl.live.side import Side
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.config.compose import compose_config
+from warp_torchrl.runs.config.arguments import again, literal
 from warp_torchrl.runs.config.construction import WORLD_KEYS
 from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 from warp_torchrl.runs.process import STOPPED, StartedTraining, TrainingProcess
-from warp_torchrl.validation import dotted
 
 ON_POLICY = ("mappo", "ippo", "ppo", "a2c")
 """Algorithms that learn from recordings."""
@@ -30,7 +28,6 @@ _LEFT_TO_THE_PAGE = (
     *("device", "processes", "compile", "graph", "logger", "curriculum", "mixture", "plugins"),
 )
 _EPISODES = 64  # of the evaluation at the end
-_PLAIN = re.compile(r"[A-Za-z_./][A-Za-z0-9_./-]*")
 _ENDS_WITHIN = 30.0  # seconds in which a training saves
 
 
@@ -54,16 +51,16 @@ def arguments(
     values = plain(restore(saved_config, overrides))
     rate = GENTLY * float(values["algorithm"]["learning_rate"])
     return [
-        *((f"plugins={_literal(values['plugins'])}",) if values["plugins"] else ()),
+        *((f"plugins={literal(values['plugins'])}",) if values["plugins"] else ()),
         *_configuration(saved_config, [each for each in overrides if not each.startswith("plugins=")]),
         *((f"device={device}",) if device.startswith("cuda") and torch.cuda.is_available() else ()),
         f"algorithm.learning_rate={rate:g}",
-        f"start_from={_literal(policy)}",
-        f"imitation.demonstrations={_literal(str(recordings))}",
+        f"start_from={literal(policy)}",
+        f"imitation.demonstrations={literal(str(recordings))}",
         f"total_frames={total_frames}",
         f"checkpoint.interval={max(1, total_frames // 10)}",
         f"evaluation.episodes={_EPISODES}",
-        f"hydra.run.dir={_literal(str(folder))}",
+        f"hydra.run.dir={literal(str(folder))}",
     ]
 
 
@@ -175,30 +172,8 @@ def _configuration(saved_config: SavedConfig, overrides: Sequence[str]) -> list[
     if "scenario" in touched:
         touched |= set(WORLD_KEYS)
     chosen = saved_config.choices | {"collector": "direct", "curriculum": "none", "logger": "csv", "mixture": "none"}
-    given = [*(f"{group}={option}" for group, option in chosen.items() if group not in touched), *overrides]
-    usual = dotted(plain(compose_config("train", given)))
-    wanted = dotted(plain(restore(saved_config, overrides))).items()
-    return given + [
-        f"{'' if path in usual else '+'}{path}={_literal(value)}"
-        for path, value in wanted
-        if path.partition(".")[0] not in _LEFT_TO_THE_PAGE
-        and not path.endswith("_target_")
-        and (path not in usual or usual[path] != value)
-        and (path in usual or not path.startswith("collector."))
-    ]
-
-
-def _literal(value: object) -> str:
-    """Return a value in Hydra's grammar."""
-    if value is None or isinstance(value, bool):
-        return {None: "null", True: "true", False: "false"}[value]
-    if isinstance(value, list | tuple):
-        return f"[{','.join(map(_literal, value))}]"
-    text = str(value)
-    if not isinstance(value, str) or (_PLAIN.fullmatch(text) and text.lower() not in ("null", "true", "false")):
-        return text
-    escaped = text.replace("\\", "\\\\").replace("'", "\\'")
-    return f"'{escaped}'"
+    options = {group: option for group, option in chosen.items() if group not in touched}
+    return again(saved_config, options, overrides, _LEFT_TO_THE_PAGE)
 
 
 def _reached(path: Path) -> tuple[int, float | None]:

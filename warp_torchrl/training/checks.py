@@ -7,6 +7,7 @@ from typing import Any
 from warp_torchrl.algorithms import parallel
 from warp_torchrl.demonstrations.acts import demonstrations
 from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs.config.arguments import networks_again
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.run_config import RunConfig
@@ -35,7 +36,7 @@ def check_training(values: Mapping[str, Any], overrides: Sequence[str], build: B
         run_config.check_training()
         _check_demonstrations(run_config)
         if values["start_from"] is not None:
-            check_start(run_config, checkpoints.newest(find_policy(values["start_from"]))[0])
+            _check_start(run_config, values)
         return
     others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug", "plugins", "total_frames")]
     if others:
@@ -49,6 +50,23 @@ def check_training(values: Mapping[str, Any], overrides: Sequence[str], build: B
     run_config = resumption(folder, new_total(values, overrides), build).run_config
     run_config.check_training()
     _check_demonstrations(run_config)
+
+
+def _check_start(run_config: RunConfig, values: Mapping[str, Any]) -> None:
+    """Check that a training can start from another run.
+
+    Raises:
+        CheckpointError: If not, with the keys that this training lacks.
+    """
+    found = checkpoints.newest(find_policy(values["start_from"]))[0]
+    try:
+        check_start(run_config, found)
+    except checkpoints.CheckpointError as refusal:
+        try:
+            keys = networks_again(found.saved_config(), values)
+        except ConfigError:  # of a plug-in that is not imported: what is refused is told all the same
+            keys = []
+        raise checkpoints.CheckpointError(f"{refusal}{'; as there: ' + ' '.join(keys) if keys else ''}") from None
 
 
 def _check_demonstrations(run_config: RunConfig) -> None:
