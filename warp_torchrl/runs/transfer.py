@@ -16,6 +16,10 @@ from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError
 from warp_torchrl.runs.config.run_config import RunConfig
 
 
+class OtherNetworksError(CheckpointError):
+    """A checkpoint has other networks, or its agents see something else: keys of observation and model mend it."""
+
+
 class Start(NamedTuple):
     """What a training starts with."""
 
@@ -28,9 +32,10 @@ def check_start(run_config: RunConfig, found: Checkpoint) -> None:
     """Check that training can start from another run's learned parameters.
 
     Raises:
-        CheckpointError: If the checkpoint has another kind of loss, or other networks, entries, actions, symmetry, or
-            roles or agencies of networks; where the algorithm replays, also if agents see something else, or it is an
-            exported policy.
+        OtherNetworksError: If the checkpoint has other networks, entries or symmetry; where the algorithm replays,
+            also if agents see something else.
+        CheckpointError: If it has another kind of loss, other actions, or roles or agencies of networks; where the
+            algorithm replays, also if it is an exported policy.
     """
     batch, env = run_config.collector.steps * run_config.n_worlds, run_config.make_env(1, 0)
     start_of(found, run_config, run_config.algorithm.build(env, run_config.model, batch), signature(env))
@@ -80,12 +85,12 @@ def _check_kind(found: Checkpoint, model: Any, here: Signature) -> None:
     symmetry = getattr(model, "symmetry", "none")  # networks of either have the same names and shapes
     theirs = found.saved_config().values.get("model", {}).get("symmetry", "none")
     _check_same(found, "model.symmetry", theirs, symmetry)
-    _check_same(found, "actions", _joined(trained.actions), _joined(here.actions))
+    _check_same(found, "actions", _joined(trained.actions), _joined(here.actions), CheckpointError)
     _check_same(found, "observation", _joined(trained.observation), _joined(here.observation))
     if sharing == "role":
-        _check_same(found, "roles", _joined(trained.roles), _joined(here.roles))
+        _check_same(found, "roles", _joined(trained.roles), _joined(here.roles), CheckpointError)
     if sharing == "agency":
-        _check_same(found, "agencies", _joined(trained.agencies), _joined(here.agencies))
+        _check_same(found, "agencies", _joined(trained.agencies), _joined(here.agencies), CheckpointError)
 
 
 def _networks_of(run_config: RunConfig, trained: Signature) -> nn.Module | None:
@@ -151,14 +156,16 @@ def _shapes(parameters: Mapping[str, Tensor]) -> dict[str, list[int]]:
     return {name: list(each.shape) for name, each in parameters.items()}
 
 
-def _check_same(found: Checkpoint, what: str, there: object, here: object) -> None:
+def _check_same(
+    found: Checkpoint, what: str, there: object, here: object, refusal: type[CheckpointError] = OtherNetworksError
+) -> None:
     """Check that something is here as it was there.
 
     Raises:
-        CheckpointError: If it is not.
+        CheckpointError: If it is not, as the given refusal.
     """
     if there != here:
-        raise CheckpointError(
+        raise refusal(
             f"{found.path} was trained by another algorithm or other networks, or its agents see more or less: "
             f"{what} is {there} there, {here} here"
         )

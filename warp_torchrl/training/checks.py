@@ -13,7 +13,7 @@ from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.policies.find import find_policy
 from warp_torchrl.runs.resumption import resumption
-from warp_torchrl.runs.transfer import check_start
+from warp_torchrl.runs.transfer import OtherNetworksError, check_start
 
 Build = Callable[[Mapping[str, Any]], RunConfig]
 """Builds a configuration of plain values."""
@@ -56,17 +56,17 @@ def _check_start(run_config: RunConfig, values: Mapping[str, Any]) -> None:
     """Check that a training can start from another run.
 
     Raises:
-        CheckpointError: If not, with the keys that this training lacks.
+        CheckpointError: If not; where other networks are the reason, with the keys that this training lacks.
     """
     found = checkpoints.newest(find_policy(values["start_from"]))[0]
     try:
         check_start(run_config, found)
-    except checkpoints.CheckpointError as refusal:
+    except OtherNetworksError as refusal:
         try:
             keys = networks_again(found.saved_config(), values)
         except ConfigError:  # of a plug-in that is not imported: what is refused is told all the same
             keys = []
-        raise checkpoints.CheckpointError(f"{refusal}{'; as there: ' + ' '.join(keys) if keys else ''}") from None
+        raise OtherNetworksError(f"{refusal}{'; as there: ' + ' '.join(keys) if keys else ''}") from None
 
 
 def _check_demonstrations(run_config: RunConfig) -> None:

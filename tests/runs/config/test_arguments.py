@@ -43,6 +43,13 @@ def test_a_refused_start_names_the_keys_with_which_it_is_none(given):
     assert networks_again(found.saved_config(), values) == []
 
 
+@pytest.mark.parametrize("given", ["algorithm=dqn", "team.allow_stay=false"])
+def test_keys_are_named_where_they_mend_a_refusal_alone(given):
+    with pytest.raises(CheckpointError, match=r"holds a policy alone|actions is") as refused:
+        check_training(composed("start_from=warp_v1", given), ())
+    assert "as there" not in str(refused.value)
+
+
 def test_what_is_matched_by_name_is_no_such_key():
     found = NamedPolicy("warp_v1").checkpoint.saved_config()
     seen = ("experiment=warp_v1", "scenario=scouts", "observation.features=[burn_probability]", "belief=ensemble")
