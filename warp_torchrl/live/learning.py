@@ -12,7 +12,7 @@ from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.match import Setting
 from warp_torchrl.live.side import Side
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.config.arguments import again, literal
+from warp_torchrl.runs.config.arguments import arguments_of, literal
 from warp_torchrl.runs.config.construction import WORLD_KEYS
 from warp_torchrl.runs.config.plain_values import plain
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
@@ -173,7 +173,7 @@ def _configuration(saved_config: SavedConfig, overrides: Sequence[str]) -> list[
         touched |= set(WORLD_KEYS)
     chosen = saved_config.choices | {"collector": "direct", "curriculum": "none", "logger": "csv", "mixture": "none"}
     options = {group: option for group, option in chosen.items() if group not in touched}
-    return again(saved_config, options, overrides, _LEFT_TO_THE_PAGE)
+    return arguments_of(saved_config, options, overrides, _LEFT_TO_THE_PAGE)
 
 
 def _reached(path: Path) -> tuple[int, float | None]:

@@ -7,7 +7,7 @@ from typing import Any
 from warp_torchrl.algorithms import parallel
 from warp_torchrl.demonstrations.acts import demonstrations
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.config.arguments import networks_again
+from warp_torchrl.runs.config.arguments import keys_of_networks
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.run_config import RunConfig
@@ -63,7 +63,7 @@ def _check_start(run_config: RunConfig, values: Mapping[str, Any]) -> None:
         check_start(run_config, found)
     except OtherNetworksError as refusal:
         try:
-            keys = networks_again(found.saved_config(), values)
+            keys = keys_of_networks(found.saved_config(), values)
         except ConfigError:  # of a plug-in that is not imported: what is refused is told all the same
             keys = []
         raise OtherNetworksError(f"{refusal}{'; as there: ' + ' '.join(keys) if keys else ''}") from None

@@ -4,7 +4,7 @@ import pytest
 
 from warp_torchrl.runs.checkpoint import CheckpointError
 from warp_torchrl.runs.config import arguments
-from warp_torchrl.runs.config.arguments import networks_again
+from warp_torchrl.runs.config.arguments import keys_of_networks
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config
 from warp_torchrl.runs.config.plain_values import plain
@@ -40,7 +40,7 @@ def test_a_refused_start_names_the_keys_with_which_it_is_none(given):
     values = composed(*start, *keys)
     found = NamedPolicy("warp_v1").checkpoint
     check_start(run_config(values), found)
-    assert networks_again(found.saved_config(), values) == []
+    assert keys_of_networks(found.saved_config(), values) == []
 
 
 @pytest.mark.parametrize("given", ["algorithm=dqn", "team.allow_stay=false"])
@@ -53,4 +53,4 @@ def test_keys_are_named_where_they_mend_a_refusal_alone(given):
 def test_what_is_matched_by_name_is_no_such_key():
     found = NamedPolicy("warp_v1").checkpoint.saved_config()
     seen = ("experiment=warp_v1", "scenario=scouts", "observation.features=[burn_probability]", "belief=ensemble")
-    assert networks_again(found, composed(*seen)) == []
+    assert keys_of_networks(found, composed(*seen)) == []

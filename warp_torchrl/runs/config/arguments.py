@@ -14,7 +14,7 @@ _BY_NAME = ("observation.channels", "observation.features")
 """What networks may see more or less of, or in another order."""
 
 
-def again(
+def arguments_of(
     saved_config: SavedConfig, options: Mapping[str, str], overrides: Sequence[str] = (), left: Sequence[str] = ()
 ) -> list[str]:
     """Return the arguments that compose a saved configuration with some options and overrides.
@@ -41,7 +41,7 @@ def again(
     ]
 
 
-def networks_again(saved_config: SavedConfig, values: Mapping[str, Any]) -> list[str]:
+def keys_of_networks(saved_config: SavedConfig, values: Mapping[str, Any]) -> list[str]:
     """Return the arguments that a composed training lacks for the networks of a saved one, and for what these see.
 
     Args:
